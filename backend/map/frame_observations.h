@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "backend/map/features.h"
+#include "backend/map/ids.h"
+
+namespace hybrid_slam {
+
+inline constexpr float kNoRightMatch = std::numeric_limits<float>::quiet_NaN();
+
+// Everything measured in one frame by one camera (a rectified stereo pair is one camera, whose
+// keypoints are those of the left image). Never changes once it is part of a keyframe; shared.
+struct FrameObservations {
+  CameraId camera;
+  std::int64_t frame_index = 0;
+  double time = 0;  // [s]
+  FeatureSet features;
+  std::vector<float>
+      u_right;  // stereo: one per keypoint [px], kNoRightMatch where there is none; mono: empty
+
+  std::size_t size() const { return features.size(); }
+  bool has_right(std::size_t keypoint) const {
+    return !u_right.empty() && !std::isnan(u_right[keypoint]);
+  }
+};
+
+}  // namespace hybrid_slam

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "backend/map/frame_observations.h"
+#include "backend/map/ids.h"
+#include "cameras/geometry/rigid3d.h"
+
+namespace hybrid_slam {
+
+// An edge of the covisibility graph.
+struct Covisible {
+  KeyframeId id;
+  int shared_landmarks = 0;
+  bool operator==(const Covisible&) const = default;
+};
+
+// A frame that stays in the map. Its observations never change and are shared; its pose and its
+// links do. The map's verbs (backend/map/map.h) are the only writers.
+struct Keyframe {
+  KeyframeId id;
+  std::shared_ptr<const FrameObservations> observations;
+  Rigid3d cam_from_world;
+  std::vector<LandmarkId> landmarks;  // one per keypoint; invalid where there is none
+  std::vector<Covisible> covisible;   // every keyframe sharing a landmark, ascending by id
+  KeyframeId parent;                  // in the spanning tree; invalid for the origin
+  std::vector<KeyframeId> children;   // ascending
+  bool keep = false;                  // exempt from culling (origin, ends of loops)
+};
+
+}  // namespace hybrid_slam

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "backend/map/map_edit.h"
+#include "backend/map/map_snapshot.h"
+
+namespace hybrid_slam {
+
+// The map: the only owner of keyframes and landmarks, changed through its verbs alone, each of
+// which keeps landmarks' derived attributes, covisibility and spanning tree right. Not thread-safe:
+// one owner; others read snapshots.
+class Map {
+ public:
+  Map();
+
+  CameraId add_camera(const Camera& camera);
+
+  // The first keyframe is the origin. Landmarks of `tracked` that are gone are dropped.
+  KeyframeId add_keyframe(const NewKeyframe& keyframe);
+
+  void apply(const MapEdit& edit);
+
+  // New poses and points, from an optimisation.
+  void move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world,
+            const std::vector<std::pair<LandmarkId, Eigen::Vector3d>>& point_in_world);
+
+  void set_camera(CameraId id, const Camera& camera);  // refined intrinsics
+  void set_keep(KeyframeId id);                        // exempt from culling
+
+  const MapSnapshot& view() const { return view_; }  // valid until the next verb
+  std::shared_ptr<const MapSnapshot> snapshot();
+
+  // Everything that must hold between the tables; empty if all is well, else one line per fault.
+  std::vector<std::string> check_consistency() const;
+
+ private:
+  MapSnapshot view_;
+};
+
+}  // namespace hybrid_slam

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "backend/map/ids.h"
+#include "backend/map/keyframe.h"
+#include "backend/map/landmark.h"
+#include "backend/map/persistent_table.h"
+#include "cameras/camera.h"
+
+namespace hybrid_slam {
+
+// What is left of an erased keyframe: its place relative to its parent in the spanning tree at that
+// moment, so that the frames tracked against it follow all later corrections.
+struct ErasedKeyframe {
+  KeyframeId parent;
+  Rigid3d cam_from_parent;
+};
+
+// A complete view of the map at one moment. Immutable, cheap to take (what changed since the last
+// one), safe to read from any thread. Only Map makes one.
+class MapSnapshot {
+ public:
+  const Keyframe* find(KeyframeId id) const;  // null if unknown or erased
+  const Landmark* find(LandmarkId id) const;
+  const Keyframe& at(KeyframeId id) const;  // throws std::out_of_range: our own bug
+  const Landmark& at(LandmarkId id) const;
+  const Camera& camera(CameraId id) const;
+  const Camera& camera(const Keyframe& keyframe) const;
+
+  std::size_t camera_count() const;
+  std::size_t keyframe_count() const;
+  std::size_t landmark_count() const;
+  std::vector<KeyframeId> keyframe_ids() const;  // ascending
+  std::vector<LandmarkId> landmark_ids() const;  // ascending
+  KeyframeId origin() const;                     // invalid while the map is empty
+
+  // Pose of a keyframe that is or was in the map, through the spanning tree if it was erased.
+  Rigid3d cam_from_world(KeyframeId id) const;
+
+  // Covisible keyframes with at least `min_shared` landmarks in common, most first (ties: lower
+  // id), at most `limit`.
+  std::vector<Covisible> covisible(KeyframeId id, int min_shared, std::size_t limit) const;
+
+ private:
+  friend class Map;
+  std::vector<Camera> cameras_;
+  PersistentTable<Keyframe> keyframes_;
+  PersistentTable<Landmark> landmarks_;
+  PersistentTable<ErasedKeyframe> erased_;
+  KeyframeId origin_;
+};
+
+}  // namespace hybrid_slam

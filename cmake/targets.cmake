@@ -1,0 +1,46 @@
+# The one way to declare a target of ours. Includes are written from the repository's root.
+
+add_library(hs_options INTERFACE)
+target_compile_options(hs_options INTERFACE -Wall -Wextra -Wconversion -Wshadow=local -Werror)
+target_include_directories(hs_options INTERFACE ${CMAKE_SOURCE_DIR})
+
+# hs_library(name SOURCES a.cpp ... DEPENDS public targets ... PRIVATE_DEPENDS hidden targets ...)
+# A room without a .cpp file is a header-only library.
+function(hs_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_link_libraries(${name} PRIVATE hs_options PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
+    target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+  else()
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE ${ARG_DEPENDS})
+    target_include_directories(${name} INTERFACE ${CMAKE_SOURCE_DIR})
+  endif()
+endfunction()
+
+# hs_program(name SOURCES main.cpp ... DEPENDS ...): a program in bin/.
+function(hs_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS})
+endfunction()
+
+# hs_test(name SOURCES a_test.cpp ... DEPENDS ...): a Catch2 program whose cases become CTest tests.
+# Cases tagged [slow] get the label "slow", all others "ci". A case that needs the shared data and does
+# not find it prints "SKIPPED" and is reported as skipped.
+function(hs_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS} hs_catch_main)
+  set(skip SKIP_REGULAR_EXPRESSION "SKIPPED: ")
+  catch_discover_tests(${name} TEST_SPEC "~[slow]" PROPERTIES LABELS ci ${skip} TIMEOUT 300)
+  catch_discover_tests(${name} TEST_SPEC "[slow]" TEST_SUFFIX " (slow)" PROPERTIES LABELS slow ${skip} TIMEOUT 3600)
+endfunction()
+
+# hs_benchmark(name SOURCES ... DEPENDS ...): a google-benchmark program in bin/.
+function(hs_benchmark name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS} benchmark::benchmark_main)
+endfunction()
