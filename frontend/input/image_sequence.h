@@ -3,21 +3,15 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "cameras/camera.h"
 #include "cameras/geometry/rigid3d.h"
+#include "cameras/input_error.h"
 #include "frontend/features/image.h"
 
 namespace hybrid_slam {
-
-// Bad input from outside. what() is one line: file, place, reason.
-class InputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 struct StampedPose {
   double time = 0;         // [s]
