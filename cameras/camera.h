@@ -43,6 +43,7 @@ std::optional<Eigen::Vector3d> unproject(const Camera& camera, const Eigen::Vect
 std::optional<Eigen::Vector3d> triangulate_stereo(const Camera& camera,
                                                   const Eigen::Vector3d& measurement);
 
+// Whether a pixel lies on the image: from -0.5 to size - 0.5, as pixel centres are integers.
 bool in_image(const Camera& camera, const Eigen::Vector2d& pixel);
 
 double focal_length(const Camera& camera);  // mean of fx and fy [px]

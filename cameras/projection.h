@@ -1,6 +1,7 @@
 #pragma once
 
 #include <concepts>
+#include <string_view>
 
 namespace hybrid_slam {
 
@@ -9,7 +10,7 @@ namespace hybrid_slam {
 // centre of the first pixel is (0, 0). A measurement is (u, v), or (u_left, v, u_right) of a
 // rectified pair. Matrices are row-major. See docs/adding_a_camera.md.
 //
-//   kMeasurementDim, kParamCount
+//   kName, kMeasurementDim, kParamCount
 //   project<T>(params, point_in_cam, measurement)
 //       False, and the measurement untouched, if the point cannot be projected.
 //   project_with_jacobians(params, point_in_cam, measurement, d_point, d_params)
@@ -19,6 +20,7 @@ namespace hybrid_slam {
 //       The unit bearing of the pixel (u, v); false if no ray has this pixel.
 template <typename M>
 concept ProjectionModel = requires(const double* in, double* out) {
+  { M::kName } -> std::convertible_to<std::string_view>;
   { M::kMeasurementDim } -> std::convertible_to<int>;
   { M::kParamCount } -> std::convertible_to<int>;
   { M::template project<double>(in, in, out) } -> std::same_as<bool>;
