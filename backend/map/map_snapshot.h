@@ -1,22 +1,15 @@
 #pragma once
 
-#include <optional>
+#include <utility>
 #include <vector>
 
 #include "backend/map/ids.h"
 #include "backend/map/keyframe.h"
 #include "backend/map/landmark.h"
-#include "backend/map/persistent_table.h"
+#include "backend/map/map_tables.h"
 #include "cameras/camera.h"
 
 namespace hybrid_slam {
-
-// What is left of an erased keyframe: its place relative to its parent in the spanning tree at that
-// moment, so that the frames tracked against it follow all later corrections.
-struct ErasedKeyframe {
-  KeyframeId parent;
-  Rigid3d cam_from_parent;
-};
 
 // A complete view of the map at one moment. Immutable, cheap to take (what changed since the last
 // one), safe to read from any thread. Only Map makes one.
@@ -45,11 +38,9 @@ class MapSnapshot {
 
  private:
   friend class Map;
-  std::vector<Camera> cameras_;
-  PersistentTable<Keyframe> keyframes_;
-  PersistentTable<Landmark> landmarks_;
-  PersistentTable<ErasedKeyframe> erased_;
-  KeyframeId origin_;
+  explicit MapSnapshot(MapTables tables) : tables_(std::move(tables)) {}
+
+  MapTables tables_;
 };
 
 }  // namespace hybrid_slam

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "backend/map/map_tables.h"
+
+namespace hybrid_slam {
+
+// The attributes of a landmark that derive from its observations (backend/map/landmark.h).
+
+// The descriptor with the least median distance to the others. Of more than 12 observations, 12
+// spread evenly over them take part: the cost stays bounded, the median hardly changes.
+void update_appearance(const MapTables& tables, Landmark& landmark);
+
+// mean_direction and object_scale, from the poses of the observing keyframes.
+void update_geometry(const MapTables& tables, Landmark& landmark);
+
+// What a landmark needs to stay: two observations, or one with depth (a stereo match).
+bool is_supported(const MapTables& tables, const Landmark& landmark);
+
+}  // namespace hybrid_slam

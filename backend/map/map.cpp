@@ -1,0 +1,160 @@
+#include "backend/map/map.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "backend/map/landmark_attributes.h"
+#include "backend/map/map_transaction.h"
+#include "backend/map/spanning_tree.h"
+
+namespace hybrid_slam {
+
+namespace {
+
+void require(bool condition, const char* what) {
+  if (!condition) throw std::logic_error(what);
+}
+
+void validate(const MapTables& tables, const NewKeyframe& made) {
+  require(made.observations != nullptr, "Map::add_keyframe: no observations");
+  const FrameObservations& frame = *made.observations;
+  require(frame.camera.value < tables.cameras.size(), "Map::add_keyframe: unknown camera");
+  require(frame.features.descriptors.size() == frame.size(),
+          "Map::add_keyframe: keypoints and descriptors differ in number");
+  require(frame.u_right.empty() || frame.u_right.size() == frame.size(),
+          "Map::add_keyframe: keypoints and right matches differ in number");
+  require(made.landmarks.empty() || made.landmarks.size() == frame.size(),
+          "Map::add_keyframe: keypoints and landmarks differ in number");
+  require(made.cam_from_world.params.allFinite(), "Map::add_keyframe: pose is not finite");
+  if (const Keyframe* origin = tables.keyframes.find(tables.origin.value)) {
+    require(origin->observations->features.kind == frame.features.kind,
+            "Map::add_keyframe: descriptors of another kind than the map's");
+  }
+  for (const auto& [keypoint, point] : made.new_points) {
+    require(keypoint < frame.size() && point.allFinite(), "Map::add_keyframe: bad new point");
+  }
+}
+
+// Nothing that has gone is a fault; what can never have been right is.
+void validate(const MapTables& tables, const MapEdit& edit) {
+  const auto check = [&](const Observation& observation) {
+    const Keyframe* keyframe = tables.keyframes.find(observation.keyframe.value);
+    require(keyframe == nullptr || observation.keypoint < keyframe->landmarks.size(),
+            "Map::apply: no such keypoint");
+  };
+  for (const auto& added : edit.new_observations) check(added.observation);
+  for (const auto& erased : edit.erased_observations) check(erased.observation);
+  for (const auto& landmark : edit.new_landmarks) {
+    require(landmark.point_in_world.allFinite(), "Map::apply: point is not finite");
+    for (const Observation& observation : landmark.observations) check(observation);
+  }
+}
+
+void count(PersistentTable<Landmark>& landmarks, const std::vector<LandmarkId>& ids,
+           int Landmark::*counter) {
+  for (const LandmarkId id : ids) {
+    if (landmarks.find(id.value) != nullptr) ++(landmarks.edit(id.value).*counter);
+  }
+}
+
+}  // namespace
+
+Map::Map() : view_(MapTables{}) {}
+
+CameraId Map::add_camera(const Camera& camera) {
+  auto& cameras = view_.tables_.cameras;
+  cameras.push_back(camera);
+  return CameraId(static_cast<std::uint32_t>(cameras.size() - 1));
+}
+
+KeyframeId Map::add_keyframe(const NewKeyframe& made) {
+  MapTables& tables = view_.tables_;
+  validate(tables, made);
+  const KeyframeId id(tables.next_keyframe++);
+  Keyframe& keyframe = tables.keyframes.insert(id.value, {});
+  keyframe.id = id;
+  keyframe.observations = made.observations;
+  keyframe.cam_from_world = made.cam_from_world;
+  keyframe.landmarks.resize(made.observations->size());
+  if (!tables.origin.valid()) {
+    tables.origin = id;
+    keyframe.keep = true;
+  }
+
+  MapTransaction transaction(tables);
+  for (std::uint32_t keypoint = 0; keypoint < made.landmarks.size(); ++keypoint) {
+    transaction.add_observation(made.landmarks[keypoint], {id, keypoint});
+  }
+  for (const auto& [keypoint, point] : made.new_points) {
+    transaction.create_landmark({point, {{id, keypoint}}});
+  }
+  transaction.commit();
+  if (id != tables.origin) attach_to_tree(tables, id, made.reference);
+  return id;
+}
+
+void Map::apply(const MapEdit& edit) {
+  MapTables& tables = view_.tables_;
+  validate(tables, edit);
+  MapTransaction transaction(tables);
+  for (const auto& merge : edit.merged) transaction.merge(merge);
+  for (const auto& added : edit.new_observations) {
+    transaction.add_observation(added.landmark, added.observation);
+  }
+  for (const auto& landmark : edit.new_landmarks) transaction.create_landmark(landmark);
+  for (const auto& erased : edit.erased_observations) {
+    transaction.remove_observation(erased.landmark, erased.observation);
+  }
+  for (const LandmarkId id : edit.erased_landmarks) transaction.erase_landmark(id);
+  for (const KeyframeId id : edit.erased_keyframes) transaction.erase_keyframe(id);
+  transaction.commit();
+  count(tables.landmarks, edit.visible, &Landmark::visible);
+  count(tables.landmarks, edit.found, &Landmark::found);
+}
+
+void Map::move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world,
+               const std::vector<std::pair<LandmarkId, Eigen::Vector3d>>& point_in_world) {
+  MapTables& tables = view_.tables_;
+  for (const auto& [id, pose] : cam_from_world) {
+    require(pose.params.allFinite(), "Map::move: pose is not finite");
+  }
+  for (const auto& [id, point] : point_in_world) {
+    require(point.allFinite(), "Map::move: point is not finite");
+  }
+  std::vector<LandmarkId> changed;
+  for (const auto& [id, pose] : cam_from_world) {
+    if (tables.keyframes.find(id.value) == nullptr) continue;
+    Keyframe& keyframe = tables.keyframes.edit(id.value);
+    keyframe.cam_from_world = pose;
+    for (const LandmarkId seen : keyframe.landmarks) {
+      if (seen.valid()) changed.push_back(seen);
+    }
+  }
+  for (const auto& [id, point] : point_in_world) {
+    if (tables.landmarks.find(id.value) == nullptr) continue;
+    tables.landmarks.edit(id.value).point_in_world = point;
+    changed.push_back(id);
+  }
+  std::sort(changed.begin(), changed.end());
+  changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+  for (const LandmarkId id : changed) update_geometry(tables, tables.landmarks.edit(id.value));
+}
+
+void Map::set_camera(CameraId id, const Camera& camera) {
+  MapTables& tables = view_.tables_;
+  tables.cameras.at(id.value) = camera;
+  for (const LandmarkId landmark : view_.landmark_ids()) {
+    update_geometry(tables, tables.landmarks.edit(landmark.value));
+  }
+}
+
+void Map::set_keep(KeyframeId id) {
+  auto& keyframes = view_.tables_.keyframes;
+  if (keyframes.find(id.value) != nullptr) keyframes.edit(id.value).keep = true;
+}
+
+std::shared_ptr<const MapSnapshot> Map::snapshot() {
+  return std::shared_ptr<const MapSnapshot>(new MapSnapshot(view_.tables_.share()));
+}
+
+}  // namespace hybrid_slam
