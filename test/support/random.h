@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <random>
@@ -13,6 +14,10 @@ class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
 
+  std::uint64_t bits() { return engine_(); }
+  std::uint64_t below(std::uint64_t count) { return engine_() % count; }
+
+  double uniform() { return uniform(0, 1); }
   double uniform(double low, double high) {
     return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
   }
@@ -30,6 +35,12 @@ class Random {
     Eigen::VectorXd v(size);
     for (double& x : v) x = uniform(-limit, limit);
     return v;
+  }
+
+  Eigen::Vector3d gaussian3(double sigma) {
+    const double x = gaussian();
+    const double y = gaussian();
+    return sigma * Eigen::Vector3d(x, y, gaussian());
   }
 
   Eigen::Vector3d direction() {
