@@ -2,6 +2,8 @@
 #   cmake -D ROOT=. -P cmake/layer_check.cmake
 # The longest prefix below that fits a file is its room. A room may include itself and what is listed.
 
+cmake_minimum_required(VERSION 3.25)
+
 set(rooms cameras/geometry cameras factors backend/map backend/problem backend frontend apps)
 set(allowed_cameras/geometry "")
 set(allowed_cameras cameras/geometry)
