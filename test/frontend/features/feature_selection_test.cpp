@@ -1,0 +1,82 @@
+#include "frontend/features/feature_selection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include <catch2/catch.hpp>
+
+namespace hybrid_slam {
+namespace {
+
+Keypoint keypoint(double x, double y, double response) {
+  Keypoint k;
+  k.x = static_cast<float>(x);
+  k.y = static_cast<float>(y);
+  k.response = static_cast<float>(response);
+  k.scale = 1;
+  return k;
+}
+
+// Strong keypoints crowded into the left eighth of a 640x480 image, weak ones everywhere.
+std::vector<Keypoint> crowd() {
+  std::mt19937 random(1);
+  const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  std::vector<Keypoint> keypoints;
+  for (int i = 0; i < 2000; ++i)
+    keypoints.push_back(keypoint(80 * unit(), 479 * unit(), 50 + unit()));
+  for (int i = 0; i < 2000; ++i)
+    keypoints.push_back(keypoint(639 * unit(), 479 * unit(), 2 + unit()));
+  return keypoints;
+}
+
+TEST_CASE("select_spread keeps all while there are no more than asked for") {
+  const std::vector<Keypoint> keypoints = {keypoint(3, 3, 1), keypoint(9, 9, 3), keypoint(5, 5, 2)};
+  CHECK(select_spread(keypoints, 20, 20, 3) == std::vector<int>{1, 2, 0});
+  CHECK(select_spread(keypoints, 20, 20, 1) == std::vector<int>{1});
+  CHECK(select_spread({}, 20, 20, 5).empty());
+}
+
+TEST_CASE("select_spread leaves out what lies outside the image") {
+  const std::vector<Keypoint> keypoints = {keypoint(-0.6, 3, 9), keypoint(19.6, 3, 9),
+                                           keypoint(3, 19.6, 9), keypoint(19.4, 19.4, 1)};
+  CHECK(select_spread(keypoints, 20, 20, 4) == std::vector<int>{3});
+}
+
+TEST_CASE("select_spread gives every part of the image its share") {
+  const std::vector<Keypoint> keypoints = crowd();
+  const std::vector<int> selected = select_spread(keypoints, 640, 480, 500);
+  REQUIRE(selected.size() == 500);
+  CHECK(std::set<int>(selected.begin(), selected.end()).size() == 500);
+  int right_half = 0;
+  for (const int i : selected) right_half += keypoints[static_cast<std::size_t>(i)].x >= 320;
+  CHECK(right_half > 220);  // none, were the strongest taken; 250, were all places alike
+  CHECK(right_half < 280);
+}
+
+TEST_CASE("select_spread takes the strongest of each place") {
+  // One cell: the order of strength alone.
+  std::vector<Keypoint> keypoints;
+  for (int i = 0; i < 100; ++i) keypoints.push_back(keypoint(i % 10, i / 10, (i * 37) % 100));
+  const std::vector<int> selected = select_spread(keypoints, 10, 10, 5);
+  std::vector<float> responses;
+  for (const int i : selected) responses.push_back(keypoints[static_cast<std::size_t>(i)].response);
+  CHECK(responses == std::vector<float>{99, 98, 97, 96, 95});
+}
+
+TEST_CASE("select_spread does not depend on the order of its input") {
+  std::vector<Keypoint> keypoints = crowd();
+  for (Keypoint& k : keypoints) k.response = std::floor(k.response);  // many ties
+  std::vector<Keypoint> reversed(keypoints.rbegin(), keypoints.rend());
+  const std::vector<int> a = select_spread(keypoints, 640, 480, 700);
+  const std::vector<int> b = select_spread(reversed, 640, 480, 700);
+  REQUIRE(a.size() == b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    CHECK(keypoints[static_cast<std::size_t>(a[i])].x ==
+          reversed[static_cast<std::size_t>(b[i])].x);
+  }
+}
+
+}  // namespace
+}  // namespace hybrid_slam
