@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "backend/map/features.h"
+
+namespace hybrid_slam {
+
+// Squared Euclidean distance of the bytes, exact: 0 .. 128 * 255^2.
+std::int32_t squared_distance(const Descriptor& a, const Descriptor& b);
+
+// distances[k] = squared_distance(query, descriptors[candidates[k]]). Many at once are cheaper.
+// `candidates` and `distances` have the same size.
+void squared_distances(const Descriptor& query, std::span<const Descriptor> descriptors,
+                       std::span<const int> candidates, std::span<std::int32_t> distances);
+
+// A distance between unit descriptors (the thresholds in options) as a squared distance of bytes,
+// rounded down; and back. Descriptors have a length of 512.
+std::int32_t to_squared_bytes(double distance);
+double from_squared_bytes(std::int32_t squared_distance);
+
+// Whether `best` beats `second` clearly: best < ratio * second, as distances (not squared). True if
+// there is no second (negative).
+bool passes_ratio(std::int32_t best, std::int32_t second, double ratio);
+
+}  // namespace hybrid_slam

@@ -1,0 +1,211 @@
+#include "frontend/matching/patch_alignment.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+namespace hybrid_slam {
+namespace {
+
+using Level = ImagePyramid::Level;
+
+// Texture below this has no place: sum of squared gradients per sample [(grey levels / px)^2].
+constexpr double kMinGradientEnergy = 0.5;
+constexpr double kMaxGainRatio = 4;
+
+// Weights of Catmull-Rom interpolation at -1, 0, 1, 2 for t in [0, 1).
+std::array<float, 4> cubic_weights(float t) {
+  const float t2 = t * t;
+  const float t3 = t2 * t;
+  return {0.5F * (-t3 + 2 * t2 - t), 0.5F * (3 * t3 - 5 * t2 + 2), 0.5F * (-3 * t3 + 4 * t2 + t),
+          0.5F * (t3 - t2)};
+}
+
+// Needs floor(x) in 1 .. width - 3 and floor(y) in 1 .. height - 3.
+float sample_cubic(const Level& level, double x, double y) {
+  const int left = static_cast<int>(x);
+  const int top = static_cast<int>(y);
+  const std::array<float, 4> wx = cubic_weights(static_cast<float>(x - left));
+  const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top));
+  float sum = 0;
+  for (int j = 0; j < 4; ++j) {
+    const float* p = level.row(top - 1 + j) + (left - 1);
+    sum += wy[static_cast<std::size_t>(j)] *
+           (wx[0] * p[0] + wx[1] * p[1] + wx[2] * p[2] + wx[3] * p[3]);
+  }
+  return sum;
+}
+
+// Whether sample_cubic works in the box centre +- (rx, ry).
+bool inside(const Level& level, double cx, double cy, double rx, double ry) {
+  return cx - rx >= 1 && cy - ry >= 1 && cx + rx < level.width - 2 && cy + ry < level.height - 2;
+}
+
+void remove_mean(std::vector<float>* values) {
+  double sum = 0;
+  for (const float v : *values) sum += v;
+  const auto mean = static_cast<float>(sum / static_cast<double>(values->size()));
+  for (float& v : *values) v -= mean;
+}
+
+double dot(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += static_cast<double>(a[i]) * b[i];
+  return sum;
+}
+
+int level_of(double scale, int levels, const AlignmentOptions& options) {
+  const int level = static_cast<int>(std::lround(std::log2(scale / options.scale_of_level0)));
+  return std::clamp(level, 0, levels - 1);
+}
+
+// The target's samples under the current place, without their mean; false outside the image.
+bool sample_target(const Level& level, int half_size, const Eigen::Matrix2d& warp,
+                   const Eigen::Vector2d& centre, std::vector<float>* samples) {
+  const Eigen::Vector2d reach = half_size * warp.cwiseAbs().rowwise().sum();
+  if (!inside(level, centre.x(), centre.y(), reach.x(), reach.y())) return false;
+  std::size_t i = 0;
+  for (int v = -half_size; v <= half_size; ++v) {
+    for (int u = -half_size; u <= half_size; ++u) {
+      const double x = centre.x() + warp(0, 0) * u + warp(0, 1) * v;
+      const double y = centre.y() + warp(1, 0) * u + warp(1, 1) * v;
+      (*samples)[i++] = sample_cubic(level, x, y);
+    }
+  }
+  remove_mean(samples);
+  return true;
+}
+
+// Solves target ~ shift_x * gradient_x + shift_y * gradient_y + gain * values; the inverse of the
+// normal matrix over the unknowns that are free.
+struct Solver {
+  explicit Solver(const ReferencePatch& patch, bool horizontal_only) {
+    Eigen::Matrix3d normal = patch.normal;
+    if (horizontal_only) {
+      normal.row(1).setZero();
+      normal.col(1).setZero();
+      normal(1, 1) = 1;
+    }
+    inverse = normal.inverse();
+    if (horizontal_only) inverse(1, 1) = 0;
+  }
+
+  Eigen::Vector3d solve(const ReferencePatch& patch, const std::vector<float>& target) const {
+    return inverse * Eigen::Vector3d(dot(patch.gradient_x, target), dot(patch.gradient_y, target),
+                                     dot(patch.values, target));
+  }
+
+  Eigen::Matrix3d inverse;
+};
+
+// How well the target's samples fit the patch at the final place, as gain * values.
+void judge(const ReferencePatch& patch, const Solver& solver, const Eigen::Matrix2d& warp,
+           const std::vector<float>& target, double pixel, Alignment* result) {
+  const double tt = dot(target, target);
+  const double rr = patch.normal(2, 2);
+  const double tr = dot(target, patch.values);
+  result->correlation = tt > 0 ? tr / std::sqrt(tt * rr) : 0;
+  const double gain = tr / rr;
+  const double squares = std::max(0.0, tt - gain * tr);
+  const auto count = static_cast<double>(target.size());
+  result->residual = std::sqrt(squares / count);
+  const Eigen::Matrix2d covariance =
+      warp * solver.inverse.topLeftCorner<2, 2>() * warp.transpose() * (squares / count);
+  const double half_trace = covariance.trace() / 2;
+  const double worst =
+      half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - covariance.determinant()));
+  result->sigma = gain > 0 ? pixel * std::sqrt(worst) / gain : 0;
+}
+
+}  // namespace
+
+std::string AlignmentOptions::validate() const {
+  if (half_size < 1 || half_size > 50) return "half_size must lie in 1..50";
+  if (!(scale_of_level0 > 0)) return "scale_of_level0 must be positive";
+  if (max_iterations < 1) return "max_iterations must be positive";
+  if (!(convergence > 0) || !(max_shift > 0)) return "convergence and max_shift must be positive";
+  if (!(min_correlation <= 1)) return "min_correlation must not exceed 1";
+  return {};
+}
+
+std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, double x, double y,
+                                                   double scale, const AlignmentOptions& options) {
+  ReferencePatch patch;
+  patch.level = level_of(scale, image.levels(), options);
+  patch.half_size = options.half_size;
+  const Level& level = image.level(patch.level);
+  const double pixel = std::ldexp(1.0, patch.level);
+  const double cx = x / pixel;
+  const double cy = y / pixel;
+  const int half = options.half_size;
+  if (!inside(level, cx, cy, half + 1, half + 1)) return std::nullopt;
+
+  const int side = 2 * half + 3;  // one more all around for the derivatives
+  std::vector<float> samples;
+  samples.reserve(static_cast<std::size_t>(side * side));
+  for (int v = -half - 1; v <= half + 1; ++v) {
+    for (int u = -half - 1; u <= half + 1; ++u) {
+      samples.push_back(sample_cubic(level, cx + u, cy + v));
+    }
+  }
+  for (int v = 1; v < side - 1; ++v) {
+    for (int u = 1; u < side - 1; ++u) {
+      const float* s = samples.data() + v * side + u;
+      patch.values.push_back(s[0]);
+      patch.gradient_x.push_back(0.5F * (s[1] - s[-1]));
+      patch.gradient_y.push_back(0.5F * (s[side] - s[-side]));
+    }
+  }
+  for (auto* column : {&patch.values, &patch.gradient_x, &patch.gradient_y}) remove_mean(column);
+  const std::vector<float>* columns[] = {&patch.gradient_x, &patch.gradient_y, &patch.values};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) patch.normal(i, j) = dot(*columns[i], *columns[j]);
+  }
+  const double energy = kMinGradientEnergy * static_cast<double>(patch.values.size());
+  if (patch.normal(0, 0) + patch.normal(1, 1) < energy) return std::nullopt;
+  return patch;
+}
+
+Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
+                      const Eigen::Matrix2d& target_from_reference, const Eigen::Vector2d& start,
+                      const AlignmentOptions& options) {
+  Alignment result;
+  result.position = start;
+  const double magnification = std::sqrt(std::abs(target_from_reference.determinant()));
+  if (!(magnification > 0.1 && magnification < 10)) return result;
+  // The target's level in which the patch's details have the size they have in the reference.
+  const int level_index =
+      std::clamp(patch.level + static_cast<int>(std::lround(std::log2(magnification))), 0,
+                 target.levels() - 1);
+  const Level& level = target.level(level_index);
+  const double pixel = std::ldexp(1.0, level_index);
+  const Eigen::Matrix2d warp = target_from_reference * std::ldexp(1.0, patch.level - level_index);
+
+  const Solver solver(patch, options.horizontal_only);
+  if (!solver.inverse.allFinite()) return result;
+  const Eigen::Vector2d first = start / pixel;
+  Eigen::Vector2d centre = first;
+  std::vector<float> samples(patch.values.size());
+  for (int i = 0; i < options.max_iterations; ++i) {
+    if (!sample_target(level, patch.half_size, warp, centre, &samples)) return result;
+    const Eigen::Vector3d solution = solver.solve(patch, samples);
+    const double gain = solution.z();
+    if (!(gain > 1 / kMaxGainRatio && gain < kMaxGainRatio)) return result;
+    // The patch shifted by `solution / gain` looks like the target: the target's place moves back.
+    const Eigen::Vector2d step = warp * (solution.head<2>() / gain);
+    centre -= step;
+    if (!((centre - first).norm() <= options.max_shift)) return result;
+    if (step.norm() > options.convergence) continue;
+    if (!sample_target(level, patch.half_size, warp, centre, &samples)) return result;
+    result.position = centre * pixel;
+    judge(patch, solver, warp, samples, pixel, &result);
+    result.converged = result.correlation >= options.min_correlation;
+    return result;
+  }
+  return result;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "frontend/matching/image_pyramid.h"
+
+namespace hybrid_slam {
+
+struct AlignmentOptions {
+  int half_size = 5;             // the patch has (2 half_size + 1)^2 samples
+  double scale_of_level0 = 1.6;  // keypoint scale [px] for which the finest level is right
+  int max_iterations = 20;
+  double convergence = 0.003;  // largest last step [px of the level]
+  double max_shift = 2.0;      // from the start [px of the level]
+  double min_correlation = 0.8;
+  bool horizontal_only = false;  // move along the reference's x axis alone
+
+  std::string validate() const;
+};
+
+// A square patch of a reference image around a keypoint, with what its alignment needs. Samples are
+// one pixel of its pyramid level apart.
+struct ReferencePatch {
+  int level = 0;
+  int half_size = 0;
+  // Row by row, each without its mean over the patch: grey values and their derivatives by a shift
+  // of the patch, per pixel of the level.
+  std::vector<float> values;
+  std::vector<float> gradient_x;
+  std::vector<float> gradient_y;
+  Eigen::Matrix3d normal;  // of (gradient_x, gradient_y, values)
+};
+
+// The patch around (x, y) [px] in the pyramid level that fits a keypoint's scale [px]. None where
+// it would leave the image or has no texture.
+std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, double x, double y,
+                                                   double scale, const AlignmentOptions& options);
+
+struct Alignment {
+  bool converged = false;          // and every limit of the options holds
+  Eigen::Vector2d position{0, 0};  // of the patch's centre in the target image [px]
+  double correlation = 0;          // zero-mean normalised, -1..1
+  double residual = 0;             // root mean square [grey levels] after gain and bias
+  double sigma = 0;                // of the position's worst direction, from the residual [px]
+};
+
+// Finds the place in `target` that looks like the patch: inverse compositional Lucas-Kanade (Baker
+// and Matthews 2004) over the position with gain and bias, which are linear and so part of every
+// step. `target_from_reference`: how offsets from the centre map between the images, fixed.
+// `start`: within about a pixel of the patch's level. Deterministic.
+Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
+                      const Eigen::Matrix2d& target_from_reference, const Eigen::Vector2d& start,
+                      const AlignmentOptions& options);
+
+}  // namespace hybrid_slam
