@@ -20,8 +20,8 @@ struct StampedPose {
 
 // One moment of a stereo sequence: rectified, row-aligned, grey.
 struct StereoImages {
-  std::int64_t frame_index = 0;
-  double time = 0;  // [s]
+  std::int64_t frame_index = 0;  // counted from 0 within the sequence as opened
+  double time = 0;               // [s]
   GrayImage left;
   GrayImage right;
 };
@@ -32,30 +32,45 @@ struct SequenceInfo {
   std::string layout;  // "kitti", "euroc" or "uwslam"
   Calibrated<RectifiedStereo> stereo;
   std::vector<double> times;       // one per frame [s], strictly ascending
-  std::vector<StampedPose> truth;  // left camera; empty where there is none
+  std::vector<StampedPose> truth;  // left camera; empty where there is none, ascending in time
   bool truth_has_rotation = false;
+  std::string truth_convention;       // as the file was read: "world_from_cam", "cam_from_world"
   std::vector<std::string> warnings;  // one line each: what was found odd and went on without
 };
 
-// A sequence of images in one of the known layouts. Calibration, times and the list of files are
-// checked when it is opened; images are decoded (and rectified) by read(). read() is const and may
-// be called from several threads.
+// A sequence of images in one of the known layouts. Calibration, truth, times and the list of files
+// are checked when it is opened; images are decoded (and rectified) by read(). read() is const and
+// may be called from several threads.
 class ImageSequence {
  public:
   virtual ~ImageSequence() = default;
   virtual const SequenceInfo& info() const = 0;
   std::size_t size() const { return info().times.size(); }
 
-  // Throws InputError if a file of this frame is missing, truncated or of the wrong size: the
-  // caller counts the frame as corrupt and goes on.
+  // Throws InputError if a file of this frame is missing, truncated, damaged or of the wrong size:
+  // the caller counts the frame as corrupt and goes on.
   virtual StereoImages read(std::size_t frame) const = 0;
 };
 
 enum class SequenceLayout { kAuto, kKitti, kEuroc, kUwslam };
 
-// Opens the sequence `name` of the dataset at `path` (empty name: the only or first one).
-// Throws InputError with one clear line.
+// How the poses of UWslam's camera_poses.txt are meant: its documents contradict each other. kAuto
+// takes the meaning under which the two cameras are clearly closer together and look at one place;
+// where that does not tell, world_from_cam, with a warning.
+enum class TruthConvention { kAuto, kWorldFromCam, kCamFromWorld };
+
+// Opens the sequence `name` of the dataset at `path`: the dataset's folder, the sequence's own, or
+// one between them. An empty name takes the only sequence, or the first with a warning.
+//
+// Throws InputError with one clear line if no layout fits; a file or folder is missing or cannot be
+// understood; times do not ascend; the calibration is not finite, not that of a rectified pair,
+// exchanged between left and right, or not for images of this size; there are no images, images
+// without a time, or more than half of the frames lack an image.
+// Goes on with a line in SequenceInfo::warnings if fewer frames lack an image (reading those
+// throws), if times reach beyond the images (left out), if timestamps have no partner in the other
+// camera (left out), or if the truth covers another number of frames. Truth is optional everywhere.
 std::unique_ptr<ImageSequence> open_sequence(const std::string& path, SequenceLayout layout,
-                                             const std::string& name);
+                                             const std::string& name,
+                                             TruthConvention convention = TruthConvention::kAuto);
 
 }  // namespace hybrid_slam

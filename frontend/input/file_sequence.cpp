@@ -1,0 +1,192 @@
+#include "frontend/input/file_sequence.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "frontend/input/text_file.h"
+
+namespace hybrid_slam {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+GrayImage read_or_throw(const fs::path& path, ImageSize size, const std::string& frame,
+                        const char* side) {
+  if (path.empty()) throw InputError(frame + ": no " + side + " image");
+  return read_gray_image(path, size);
+}
+
+bool is_image_extension(std::string extension) {
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+}  // namespace
+
+FileSequence::FileSequence(SequenceInfo info, std::vector<FramePaths> files,
+                           std::unique_ptr<const StereoRectifier> rectifier)
+    : info_(std::move(info)), files_(std::move(files)), rectifier_(std::move(rectifier)) {
+  if (files_.size() != info_.times.size()) throw std::logic_error("one time per frame");
+}
+
+StereoImages FileSequence::read(std::size_t frame) const {
+  const FramePaths& paths = files_.at(frame);
+  const ImageSize size{info_.stereo.width, info_.stereo.height};
+  const std::string name = info_.name + ": frame " + std::to_string(frame);
+  StereoImages images;
+  images.frame_index = static_cast<std::int64_t>(frame);
+  images.time = info_.times[frame];
+  images.left = read_or_throw(paths.left, size, name, "left");
+  images.right = read_or_throw(paths.right, size, name, "right");
+  if (rectifier_) {
+    rectifier_->rectify_left(images.left);
+    rectifier_->rectify_right(images.right);
+  }
+  return images;
+}
+
+NumberedImages list_numbered_images(const fs::path& folder, const std::string& suffix) {
+  if (!fs::is_directory(folder)) throw InputError(folder.string() + ": no such folder");
+  NumberedImages images;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const fs::path& path = entry.path();
+    const std::string stem = path.stem().string();
+    if (!is_image_extension(path.extension().string()) || !stem.ends_with(suffix)) continue;
+    int number = 0;
+    const char* const end = stem.data() + stem.size() - suffix.size();
+    const auto [parsed, error] = std::from_chars(stem.data(), end, number);
+    if (error != std::errc() || parsed != end || number < 0) continue;
+    const auto [other, is_new] = images.emplace(number, path);
+    if (!is_new) {
+      const auto [low, high] = std::minmax(other->second, path);
+      throw InputError(high.string() + ": same number as " + low.filename().string());
+    }
+  }
+  return images;
+}
+
+NumberedFrames match_frames(const std::vector<double>& times, const fs::path& times_path,
+                            const NumberedImages& left, const NumberedImages& right,
+                            std::vector<std::string>& warnings) {
+  if (left.empty() || right.empty()) throw std::logic_error("the caller checks for images");
+  const int first = std::min(left.begin()->first, right.begin()->first);
+  const int last = std::max(left.rbegin()->first, right.rbegin()->first);
+  const int rows = static_cast<int>(times.size());
+  if (last >= rows) {
+    throw InputError(times_path.string() + ": has " + std::to_string(rows) +
+                     " times, but there are images up to number " + std::to_string(last));
+  }
+  if (last - first + 1 < rows) {
+    warnings.push_back(times_path.string() + ": has " + std::to_string(rows) +
+                       " times, images exist from " + std::to_string(first) + " to " +
+                       std::to_string(last) + "; the other times are left out");
+  }
+  NumberedFrames frames;
+  frames.first = first;
+  for (int number = first; number <= last; ++number) {
+    const auto left_path = left.find(number);
+    const auto right_path = right.find(number);
+    frames.files.push_back({left_path == left.end() ? fs::path() : left_path->second,
+                            right_path == right.end() ? fs::path() : right_path->second});
+    frames.times.push_back(times[static_cast<std::size_t>(number)]);
+  }
+  const fs::path folder = left.begin()->second.parent_path();
+  check_completeness(frames.files, folder.parent_path().string(), warnings);
+  return frames;
+}
+
+void check_completeness(const std::vector<FramePaths>& files, const std::string& where,
+                        std::vector<std::string>& warnings) {
+  const auto lacks = [](const FramePaths& f) { return f.left.empty() || f.right.empty(); };
+  const auto count = std::count_if(files.begin(), files.end(), lacks);
+  if (count == 0) return;
+  const auto first = std::find_if(files.begin(), files.end(), lacks) - files.begin();
+  const std::string line =
+      where + ": " + std::to_string(count) + " of " + std::to_string(files.size()) +
+      " frames lack an image (first: frame " + std::to_string(first) + ", " +
+      (files[static_cast<std::size_t>(first)].left.empty() ? "left" : "right") + ")";
+  if (2 * static_cast<std::size_t>(count) > files.size()) throw InputError(line);
+  warnings.push_back(line);
+}
+
+ImageSize first_image_size(const std::vector<FramePaths>& files) {
+  std::string first_error = "the dataset holds no left images";
+  bool failed = false;
+  for (const FramePaths& paths : files) {
+    if (paths.left.empty()) continue;
+    try {
+      return read_image_size(paths.left);
+    } catch (const InputError& error) {
+      if (!failed) first_error = error.what();
+      failed = true;
+    }
+  }
+  throw InputError(first_error);
+}
+
+Calibrated<RectifiedStereo> make_stereo_camera(double fx, double fy, double cx, double cy,
+                                               double baseline, ImageSize size,
+                                               const std::string& source) {
+  for (const double value : {fx, fy, cx, cy, baseline}) {
+    if (!std::isfinite(value)) throw InputError(source + ": a value is not finite");
+  }
+  if (!(fx > 0 && fy > 0)) throw InputError(source + ": the focal length is not positive");
+  if (!(baseline > 0)) {
+    throw InputError(source +
+                     ": the baseline is not positive; are the cameras or their files exchanged?");
+  }
+  if (!(cx > 0 && cx < size.width && cy > 0 && cy < size.height)) {
+    throw InputError(source + ": the principal point lies outside the image");
+  }
+  return {{fx, fy, cx, cy, baseline}, size.width, size.height};
+}
+
+void check_image_size(ImageSize image, ImageSize calibrated, const std::string& source) {
+  if (image == calibrated) return;
+  throw InputError(source + ": calibrated for " + std::to_string(calibrated.width) + "x" +
+                   std::to_string(calibrated.height) + ", but the images are " +
+                   std::to_string(image.width) + "x" + std::to_string(image.height));
+}
+
+std::string folder_name(const fs::path& path) {
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
+std::optional<fs::path> choose_sequence(const fs::path& path, const std::vector<fs::path>& parents,
+                                        const std::string& name,
+                                        const std::function<bool(const fs::path&)>& is_sequence,
+                                        std::vector<std::string>& warnings) {
+  if (name.empty() ? is_sequence(path) : (folder_name(path) == name && is_sequence(path))) {
+    return path;
+  }
+  std::vector<fs::path> found;
+  for (const fs::path& parent : parents) {
+    if (!fs::is_directory(parent)) continue;
+    for (const fs::directory_entry& entry : fs::directory_iterator(parent)) {
+      if (entry.is_directory() && is_sequence(entry.path())) found.push_back(entry.path());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  std::string names;
+  for (const fs::path& folder : found) {
+    if (folder.filename() == name) return folder;
+    names += (names.empty() ? "" : ", ") + folder.filename().string();
+  }
+  if (!name.empty()) {
+    if (is_sequence(path)) names = folder_name(path) + (names.empty() ? "" : ", ") + names;
+    if (names.empty()) return std::nullopt;
+    throw InputError(path.string() + ": no sequence \"" + name + "\"; there is: " + names);
+  }
+  if (found.empty()) return std::nullopt;
+  if (found.size() > 1) {
+    warnings.push_back(path.string() + ": holds several sequences (" + names + "); took " +
+                       found.front().filename().string());
+  }
+  return found.front();
+}
+
+}  // namespace hybrid_slam

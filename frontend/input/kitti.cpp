@@ -1,0 +1,92 @@
+#include <cmath>
+
+#include "frontend/input/file_sequence.h"
+#include "frontend/input/pose_rows.h"
+#include "frontend/input/text_file.h"
+
+// KITTI odometry: sequences/<id>/{image_0,image_1}/<number>.png, calib.txt, times.txt and, beside
+// sequences/, poses/<id>.txt.
+namespace hybrid_slam {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kMaxRelativeDifference = 1e-6;  // between the two cameras of a rectified pair
+
+bool is_kitti_sequence(const fs::path& folder) {
+  return fs::is_directory(folder / "image_0") || fs::is_directory(folder / "image_1");
+}
+
+// The 3x4 matrix of the line that starts with `label`.
+std::vector<double> projection_matrix(const std::vector<TextLine>& lines, const fs::path& path,
+                                      const std::string& label) {
+  for (const TextLine& line : lines) {
+    if (!line.text.starts_with(label)) continue;
+    std::vector<double> matrix;
+    for (const std::string_view field :
+         split_fields(std::string_view(line.text).substr(label.size()), ' ')) {
+      matrix.push_back(parse_number(field, path, line.number));
+    }
+    if (matrix.size() != 12) {
+      throw line_error(path, line.number, label + " expected 12 numbers");
+    }
+    return matrix;
+  }
+  throw InputError(path.string() + ": no line \"" + label + "\"");
+}
+
+Calibrated<RectifiedStereo> read_calibration(const fs::path& path, ImageSize size) {
+  const std::vector<TextLine> lines = read_lines(path);
+  const std::vector<double> left = projection_matrix(lines, path, "P0:");
+  const std::vector<double> right = projection_matrix(lines, path, "P1:");
+  for (const std::size_t i : {0, 2, 5, 6}) {
+    if (!(std::abs(left[i] - right[i]) <= kMaxRelativeDifference * std::abs(left[i]))) {
+      throw InputError(path.string() + ": P0 and P1 are not those of a rectified pair");
+    }
+  }
+  const double baseline = (left[3] - right[3]) / left[0];
+  return make_stereo_camera(left[0], left[5], left[2], left[6], baseline, size, path.string());
+}
+
+void read_truth(const fs::path& path, const NumberedFrames& frames, std::size_t rows_of_times,
+                SequenceInfo& info) {
+  const std::vector<NumberRow> rows = read_number_rows(path, ' ');
+  if (rows.size() != rows_of_times) {
+    info.warnings.push_back(path.string() + ": has " + std::to_string(rows.size()) + " poses for " +
+                            std::to_string(rows_of_times) + " times");
+  }
+  const std::size_t first = static_cast<std::size_t>(frames.first);
+  for (std::size_t i = 0; i < frames.times.size() && first + i < rows.size(); ++i) {
+    info.truth.push_back({frames.times[i], kitti_pose(rows[first + i], path)});
+  }
+  info.truth_has_rotation = !info.truth.empty();
+}
+
+}  // namespace
+
+std::unique_ptr<ImageSequence> open_kitti(const fs::path& path, const std::string& name) {
+  SequenceInfo info;
+  const auto folder =
+      choose_sequence(path, {path, path / "sequences"}, name, is_kitti_sequence, info.warnings);
+  if (!folder) return nullptr;
+  info.name = folder_name(*folder);
+  info.layout = "kitti";
+  const NumberedImages left = list_numbered_images(*folder / "image_0", "");
+  const NumberedImages right = list_numbered_images(*folder / "image_1", "");
+  for (const auto& [images, side] : {std::pair(&left, "image_0"), std::pair(&right, "image_1")}) {
+    if (images->empty()) throw InputError((*folder / side).string() + ": holds no images");
+  }
+  const std::vector<double> times = read_times(*folder / "times.txt");
+  NumberedFrames frames = match_frames(times, *folder / "times.txt", left, right, info.warnings);
+  info.stereo = read_calibration(*folder / "calib.txt", first_image_size(frames.files));
+  const fs::path truth =
+      fs::absolute(*folder).lexically_normal() / ".." / ".." / "poses" / (info.name + ".txt");
+  if (fs::exists(truth.lexically_normal())) {
+    read_truth(truth.lexically_normal(), frames, times.size(), info);
+  }
+  info.times = std::move(frames.times);
+  return std::make_unique<FileSequence>(std::move(info), std::move(frames.files), nullptr);
+}
+
+}  // namespace hybrid_slam

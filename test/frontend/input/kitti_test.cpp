@@ -1,0 +1,246 @@
+#include <catch2/catch.hpp>
+
+#include "frontend/input/pose_rows.h"
+#include "test/frontend/input/dataset_writer.h"
+
+namespace hybrid_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kFrames = 8;
+const char* const kCalibration =
+    "P0: 700 0 30 0 0 700 20 0 0 0 1 0\nP1: 700 0 30 -350 0 700 20 0 0 0 1 0\n";
+
+fs::path image(const fs::path& root, int side, int number, const char* ending = ".png") {
+  char name[16];
+  std::snprintf(name, sizeof(name), "%06d", number);
+  return root / "sequences" / "07" / (side == 0 ? "image_0" : "image_1") /
+         (std::string(name) + ending);
+}
+
+void write_kitti(const fs::path& root, bool with_truth = true) {
+  std::string times, poses;
+  for (int i = 0; i < kFrames; ++i) {
+    for (int side = 0; side < 2; ++side) {
+      write_picture(image(root, side, i), test_picture(60, 40, 2 * i + side));
+    }
+    times += std::to_string(0.5 * i) + "\n";
+    poses += "0 -1 0 " + std::to_string(i) + " 1 0 0 2 0 0 1 3\n";  // 90 degrees about z
+  }
+  write_text(root / "sequences/07/calib.txt", kCalibration);
+  write_text(root / "sequences/07/times.txt", times);
+  if (with_truth) write_text(root / "poses/07.txt", poses);
+}
+
+TEST_CASE("a KITTI dataset opens from its root, its sequences and the sequence") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  const fs::path root = folder.path();
+  for (const auto& [path, name] :
+       {std::pair(root, "07"), std::pair(root, ""), std::pair(root / "sequences", "07"),
+        std::pair(root / "sequences/07", ""), std::pair(root / "sequences/07/", "07")}) {
+    const auto sequence = open_sequence(path.string(), SequenceLayout::kAuto, name);
+    const SequenceInfo& info = sequence->info();
+    CHECK(info.layout == "kitti");
+    CHECK(info.name == "07");
+    CHECK(info.warnings.empty());
+    CHECK(sequence->size() == kFrames);
+    CHECK(info.times[3] == Approx(1.5));
+    CHECK(info.stereo.params == std::array<double, 5>{700, 700, 30, 20, 0.5});
+    CHECK(info.stereo.width == 60);
+    CHECK(info.stereo.height == 40);
+    REQUIRE(info.truth.size() == kFrames);
+    CHECK(info.truth_has_rotation);
+    CHECK(info.truth[4].time == Approx(2));
+    const Eigen::Vector3d moved = info.truth[4].world_from_cam * Eigen::Vector3d(1, 0, 0);
+    CHECK((moved - Eigen::Vector3d(4, 3, 3)).norm() < 1e-12);
+    const StereoImages images = sequence->read(5);
+    CHECK(images.frame_index == 5);
+    CHECK(images.time == Approx(2.5));
+    CHECK(holds(images.left, test_picture(60, 40, 10)));
+    CHECK(holds(images.right, test_picture(60, 40, 11)));
+  }
+}
+
+TEST_CASE("a KITTI sequence without truth, and one with less truth than frames") {
+  const TempFolder folder;
+  write_kitti(folder.path(), false);
+  CHECK(open_sequence(folder.path().string(), SequenceLayout::kKitti, "")->info().truth.empty());
+  write_text(folder.path() / "poses/07.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kKitti, "");
+  CHECK(sequence->info().truth.size() == 1);
+  CHECK(sequence->info().warnings.size() == 1);
+}
+
+TEST_CASE("single missing images make corrupt frames, a cut copy a shorter sequence") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  fs::remove(image(folder.path(), 1, 3));
+  fs::remove(image(folder.path(), 0, 5));
+  fs::remove(image(folder.path(), 0, 7));
+  fs::remove(image(folder.path(), 1, 7));
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "07");
+  CHECK(sequence->size() == 7);
+  CHECK(sequence->info().truth.size() == 7);
+  CHECK(sequence->info().warnings.size() == 2);
+  for (std::size_t i = 0; i < sequence->size(); ++i) {
+    const std::string line = complaint([&] { sequence->read(i); });
+    const std::string expected = i == 3 ? "no right image" : i == 5 ? "no left image" : "";
+    CHECK((expected.empty() ? line.empty() : line.find(expected) != std::string::npos));
+  }
+}
+
+TEST_CASE("a sequence that starts in the middle keeps its times and truth") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  for (int i = 0; i < 2; ++i) {
+    fs::remove(image(folder.path(), 0, i));
+    fs::remove(image(folder.path(), 1, i));
+  }
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "07");
+  REQUIRE(sequence->size() == 6);
+  CHECK(sequence->info().times[0] == Approx(1));
+  CHECK(sequence->info().truth[0].world_from_cam.translation().x() == Approx(2));
+  CHECK(holds(sequence->read(0).left, test_picture(60, 40, 4)));
+}
+
+TEST_CASE("damaged images fail when read, and only those") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  truncate_file(image(folder.path(), 0, 0));
+  truncate_file(image(folder.path(), 1, 4));
+  write_picture(image(folder.path(), 1, 6), test_picture(61, 40, 0));
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "07");
+  CHECK(sequence->info().warnings.empty());
+  for (std::size_t i = 0; i < sequence->size(); ++i) {
+    const std::string line = complaint([&] { sequence->read(i); });
+    CHECK(line.empty() == (i != 0 && i != 4 && i != 6));
+  }
+}
+
+TEST_CASE("a KITTI dataset that cannot be used is refused with one line") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  const fs::path sequence = folder.path() / "sequences/07";
+  std::string expected;
+  std::string name = "07";
+
+  SECTION("no right folder") {
+    fs::remove_all(sequence / "image_1");
+    expected = "image_1: no such folder";
+  }
+  SECTION("empty right folder") {
+    fs::remove_all(sequence / "image_1");
+    fs::create_directory(sequence / "image_1");
+    expected = "image_1: holds no images";
+  }
+  SECTION("most right images missing") {
+    for (int i = 2; i < kFrames; ++i) fs::remove(image(folder.path(), 1, i));
+    expected = "6 of 8 frames lack an image";
+  }
+  SECTION("more images than times") {
+    write_text(sequence / "times.txt", "0\n1\n2\n3\n4\n");
+    expected = "has 5 times, but there are images up to number 7";
+  }
+  SECTION("times out of order") {
+    write_text(sequence / "times.txt", "0\n1\n2\n4\n3\n5\n6\n7\n");
+    expected = "times.txt:5: times are not strictly ascending";
+  }
+  SECTION("a time is not a number") {
+    write_text(sequence / "times.txt", "0\n1\nnan\n4\n5\n6\n7\n8\n");
+    expected = "times.txt:3: \"nan\" is not finite";
+  }
+  SECTION("no times") {
+    fs::remove(sequence / "times.txt");
+    expected = "times.txt: no such file";
+  }
+  SECTION("no calibration") {
+    fs::remove(sequence / "calib.txt");
+    expected = "calib.txt: no such file";
+  }
+  SECTION("calibration of one camera") {
+    write_text(sequence / "calib.txt", "P0: 700 0 30 0 0 700 20 0 0 0 1 0\n");
+    expected = "calib.txt: no line \"P1:\"";
+  }
+  SECTION("short calibration") {
+    replace_text(sequence / "calib.txt", "-350 0 700", "-350 700");
+    expected = "calib.txt:2: P1: expected 12 numbers";
+  }
+  SECTION("calibration not a number") {
+    replace_text(sequence / "calib.txt", "P0: 700", "P0: nan");
+    expected = "calib.txt:1: \"nan\" is not finite";
+  }
+  SECTION("calibration exchanged") {
+    write_text(sequence / "calib.txt",
+               "P1: 700 0 30 0 0 700 20 0 0 0 1 0\nP0: 700 0 30 -350 0 700 20 0 0 0 1 0\n");
+    expected = "calib.txt: the baseline is not positive";
+  }
+  SECTION("no baseline") {
+    replace_text(sequence / "calib.txt", "-350", "0");
+    expected = "calib.txt: the baseline is not positive";
+  }
+  SECTION("negative focal length") {
+    write_text(sequence / "calib.txt",
+               "P0: -7 0 30 0 0 -7 20 0 0 0 1 0\nP1: -7 0 30 -350 0 -7 20 0 0 0 1 0\n");
+    expected = "calib.txt: the focal length is not positive";
+  }
+  SECTION("two focal lengths") {
+    replace_text(sequence / "calib.txt", "P1: 700", "P1: 710");
+    expected = "not those of a rectified pair";
+  }
+  SECTION("principal point outside") {
+    write_text(sequence / "calib.txt",
+               "P0: 700 0 300 0 0 700 20 0 0 0 1 0\nP1: 700 0 300 -350 0 700 20 0 0 0 1 0\n");
+    expected = "calib.txt: the principal point lies outside the image";
+  }
+  SECTION("truth not finite") {
+    replace_text(folder.path() / "poses/07.txt", "0 -1 0 3", "0 -1 0 inf");
+    expected = "07.txt:4: \"inf\" is not finite";
+  }
+  SECTION("truth not a rotation") {
+    replace_text(folder.path() / "poses/07.txt", "0 -1 0 3", "0 -2 0 3");
+    expected = "07.txt:4: the 3x3 part is not a rotation";
+  }
+  SECTION("two images of one number") {
+    write_picture(image(folder.path(), 0, 2, ".jpg"), test_picture(60, 40, 2));
+    expected = "same number";
+  }
+  SECTION("every left image broken") {
+    for (int i = 0; i < kFrames; ++i) truncate_file(image(folder.path(), 0, i));
+    expected = "000000.png: truncated PNG";
+  }
+  SECTION("another name") {
+    name = "08";
+    expected = "no sequence \"08\"; there is: 07";
+  }
+  INFO(expected);
+  const std::string line = open_complaint(folder.path(), name);
+  INFO(line);
+  CHECK(line.find(expected) != std::string::npos);
+}
+
+TEST_CASE("a folder in no layout is refused") {
+  const TempFolder folder;
+  CHECK(open_complaint(folder.path()).find("no sequence in a known layout") != std::string::npos);
+  CHECK(open_complaint(folder.path() / "x").find("no such folder") != std::string::npos);
+  write_kitti(folder.path());
+  CHECK(open_complaint(folder.path(), "", SequenceLayout::kEuroc).find("no EuRoC sequence") !=
+        std::string::npos);
+  CHECK(open_complaint(folder.path(), "", SequenceLayout::kUwslam).find("no UWslam sequence") !=
+        std::string::npos);
+}
+
+TEST_CASE("the first of several sequences is taken with a warning") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  fs::copy(folder.path() / "sequences/07", folder.path() / "sequences/03",
+           fs::copy_options::recursive);
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  CHECK(sequence->info().name == "03");
+  REQUIRE(sequence->info().warnings.size() == 1);
+  CHECK(sequence->info().warnings[0].find("03, 07") != std::string::npos);
+}
+
+}  // namespace
+}  // namespace hybrid_slam

@@ -1,0 +1,53 @@
+#include "frontend/input/text_file.h"
+
+#include <catch2/catch.hpp>
+
+#include "test/frontend/input/dataset_writer.h"
+
+namespace hybrid_slam {
+namespace {
+
+TEST_CASE("rows of numbers, comments and Windows line ends") {
+  const TempFolder folder;
+  const auto path = folder.path() / "a.txt";
+  write_text(path, "# head\r\n1 -2.5e-3\t+3\r\n\r\n  4 , 5\n");
+  const auto rows = read_number_rows(path, ' ');
+  REQUIRE(rows.size() == 2);
+  CHECK(rows[0].line == 2);
+  CHECK(rows[0].values == std::vector<double>{1, -2.5e-3, 3});
+  CHECK(rows[1].line == 4);
+  CHECK(rows[1].values == std::vector<double>{4, 5});
+}
+
+TEST_CASE("what is no finite number is refused with its line") {
+  const TempFolder folder;
+  const auto path = folder.path() / "a.txt";
+  for (const char* const bad : {"nan", "inf", "-INF", "1e999", "1.5x", "abc", "--1", "+-1", "1e"}) {
+    write_text(path, std::string("1\n2\n") + bad + "\n");
+    const std::string line = complaint([&] { read_number_rows(path, ' '); });
+    INFO(bad);
+    CHECK(line.find(path.string() + ":3: ") == 0);
+  }
+  write_text(path, "1,,2\n");
+  CHECK(complaint([&] { read_number_rows(path, ','); }).find(":1: ") != std::string::npos);
+}
+
+TEST_CASE("times ascend strictly, one per line") {
+  const TempFolder folder;
+  const auto path = folder.path() / "times.txt";
+  write_text(path, "0\n0.1\n0.25\n");
+  CHECK(read_times(path) == std::vector<double>{0, 0.1, 0.25});
+  write_text(path, "0\n0.1\n0.1\n");
+  CHECK(complaint([&] { read_times(path); }).find(":3: times are not strictly ascending") !=
+        std::string::npos);
+  write_text(path, "0\n0.2\n0.1\n");
+  CHECK(complaint([&] { read_times(path); }).find(":3: ") != std::string::npos);
+  write_text(path, "0\n0.2 7\n");
+  CHECK(complaint([&] { read_times(path); }).find(":2: ") != std::string::npos);
+  write_text(path, "# nothing\n");
+  CHECK(complaint([&] { read_times(path); }).find("no times") != std::string::npos);
+  CHECK(complaint([&] { read_times(folder.path()); }).find("cannot be read") != std::string::npos);
+}
+
+}  // namespace
+}  // namespace hybrid_slam
