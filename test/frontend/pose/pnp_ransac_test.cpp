@@ -5,12 +5,11 @@
 
 #include <catch2/catch.hpp>
 
-#include "test/frontend/pose_scene.h"
+#include "test/frontend/pose/pose_scene.h"
+#include "test/support/random.h"
 
 namespace hybrid_slam {
 namespace {
-
-using pose_scene::Random;
 
 struct Scene {
   Rigid3d truth;
@@ -36,19 +35,19 @@ struct SceneOptions {
 Scene make_scene(const SceneOptions& options) {
   Random random(options.seed);
   Scene scene;
-  scene.truth = random.pose(3, 20);
+  scene.truth = random.rigid(20, 3);
   for (int i = 0; i < options.count; ++i) {
-    Eigen::Vector3d ray = random.unit();
-    while (std::acos(ray.z()) > options.max_angle) ray = random.unit();
+    Eigen::Vector3d ray = random.direction();
+    while (std::acos(ray.z()) > options.max_angle) ray = random.direction();
     const Eigen::Vector3d point =
         ray * (options.planar ? 5 / (ray.z() + 0.3 * ray.x()) : random.uniform(2, 12));
     const Eigen::Vector3d side = ray.unitOrthogonal();
     Eigen::Vector3d bearing =
-        ray + options.sigma * (random.normal() * side + random.normal() * ray.cross(side));
+        ray + options.sigma * (random.gaussian() * side + random.gaussian() * ray.cross(side));
     const bool outlier = random.uniform(0, 1) < options.outlier_share;
     if (outlier) {
       do {
-        bearing = random.unit();
+        bearing = random.direction();
       } while (std::acos(bearing.z()) > options.max_angle || bearing.dot(ray) > 0.999);
     }
     scene.bearings.push_back(bearing.normalized());
@@ -120,7 +119,7 @@ TEST_CASE("PnP weighs bearings by their standard deviation", "[pose]") {
   Scene scene = make_scene({.count = 200, .outlier_share = 0, .sigma = 0.0002, .seed = 5});
   Random random(11);
   for (std::size_t i = 0; i < scene.bearings.size(); i += 2) {
-    scene.bearings[i] = (scene.bearings[i] + 0.01 * random.unit()).normalized();
+    scene.bearings[i] = (scene.bearings[i] + 0.01 * random.direction()).normalized();
     scene.sigma[i] = 0.01;
   }
   const auto weighted = scene.solve();

@@ -5,12 +5,12 @@
 
 #include <catch2/catch.hpp>
 
-#include "test/frontend/pose_scene.h"
+#include "test/frontend/pose/pose_scene.h"
+#include "test/support/random.h"
 
 namespace hybrid_slam {
 namespace {
 
-using pose_scene::Random;
 using Points = std::vector<Eigen::Vector3d>;
 
 template <typename Transform>
@@ -22,7 +22,7 @@ Points moved_by(const Transform& b_from_a, const Points& points) {
 
 Points random_points(int count, Random& random) {
   Points points;
-  for (int i = 0; i < count; ++i) points.push_back(random.vector(-5, 5));
+  for (int i = 0; i < count; ++i) points.push_back(random.vector(3, 5));
   return points;
 }
 
@@ -36,7 +36,7 @@ TEST_CASE("alignment recovers a rigid transform", "[pose]") {
   Random random(1);
   for (const int count : {3, 4, 100}) {
     for (int trial = 0; trial < 20; ++trial) {
-      const Rigid3d truth = random.pose(3.14, 50);
+      const Rigid3d truth = random.rigid(50, 3.14);
       const Points a = random_points(count, random);
       const auto found = align_rigid(a, moved_by(truth, a));
       REQUIRE(found);
@@ -49,7 +49,7 @@ TEST_CASE("alignment recovers a rigid transform", "[pose]") {
 TEST_CASE("alignment recovers a similarity", "[pose]") {
   Random random(2);
   for (const double scale : {0.01, 1.0, 37.0}) {
-    const Rigid3d rigid = random.pose(3.14, 50);
+    const Rigid3d rigid = random.rigid(50, 3.14);
     const Sim3d truth(Eigen::Quaterniond(rigid.rotation()), rigid.translation(), scale);
     const Points a = random_points(20, random);
     const auto found = align_similarity(a, moved_by(truth, a));
@@ -62,7 +62,7 @@ TEST_CASE("alignment recovers a similarity", "[pose]") {
 TEST_CASE("alignment of points in a plane does not mirror them", "[pose]") {
   Random random(3);
   for (int trial = 0; trial < 20; ++trial) {
-    const Rigid3d truth = random.pose(3.14, 5);
+    const Rigid3d truth = random.rigid(5, 3.14);
     Points a = random_points(10, random);
     for (Eigen::Vector3d& p : a) p.z() = 0;
     const auto found = align_rigid(a, moved_by(truth, a));
@@ -84,15 +84,15 @@ TEST_CASE("alignment of a mirrored set is still a rotation", "[pose]") {
 
 TEST_CASE("alignment is the least-squares one under noise", "[pose]") {
   Random random(5);
-  const Rigid3d truth = random.pose(3.14, 5);
+  const Rigid3d truth = random.rigid(5, 3.14);
   const Points a = random_points(50, random);
   Points b = moved_by(truth, a);
-  for (Eigen::Vector3d& p : b) p += 0.05 * random.unit();
+  for (Eigen::Vector3d& p : b) p += 0.05 * random.direction();
   const auto found = align_rigid(a, b);
   REQUIRE(found);
   const double at_solution = squared_distance(*found, a, b);
   for (int trial = 0; trial < 100; ++trial) {
-    CHECK(squared_distance(random.pose(1e-3, 1e-3) * *found, a, b) > at_solution);
+    CHECK(squared_distance(random.rigid(1e-3, 1e-3) * *found, a, b) > at_solution);
   }
   CHECK(pose_scene::rotation_error(*found, truth) < 0.01);
 }
@@ -100,10 +100,10 @@ TEST_CASE("alignment is the least-squares one under noise", "[pose]") {
 TEST_CASE("alignment works far from the origin and along a path that is nearly straight",
           "[pose]") {
   Random random(6);
-  const Rigid3d truth = random.pose(3.14, 1e5);
+  const Rigid3d truth = random.rigid(1e5, 3.14);
   Points a;
   for (int i = 0; i < 60; ++i) {
-    a.push_back({1e5 + 0.01 * random.normal(), 0.01 * random.normal(), static_cast<double>(i)});
+    a.push_back({1e5 + 0.01 * random.gaussian(), 0.01 * random.gaussian(), static_cast<double>(i)});
   }
   const auto found = align_rigid(a, moved_by(truth, a));
   REQUIRE(found);

@@ -7,12 +7,12 @@
 #include <catch2/catch.hpp>
 
 #include "cameras/geometry/se3.h"
-#include "test/frontend/pose_scene.h"
+#include "test/frontend/pose/pose_scene.h"
+#include "test/support/random.h"
 
 namespace hybrid_slam {
 namespace {
 
-using pose_scene::Random;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 struct Scene {
@@ -25,7 +25,7 @@ struct Scene {
 // A point that the camera sees; for the fisheye up to `max_angle` off its axis.
 Eigen::Vector3d visible_point(const Camera& camera, Random& random, double max_angle) {
   for (;;) {
-    const Eigen::Vector3d direction = random.unit();
+    const Eigen::Vector3d direction = random.direction();
     if (std::acos(direction.z()) > max_angle) continue;
     const Eigen::Vector3d point = direction * random.uniform(2, 15);
     const auto pixel = project(camera, point);
@@ -42,14 +42,14 @@ Eigen::Vector3d measure(const Camera& camera, const Eigen::Vector3d& point, bool
 Scene make_scene(const Camera& camera, int count, double outlier_share, double right_share,
                  std::uint64_t seed, double max_angle = 1.75) {
   Random random(seed);
-  Scene scene{camera, random.pose(3, 20), {}, {}};
+  Scene scene{camera, random.rigid(20, 3), {}, {}};
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d point = visible_point(camera, random, max_angle);
     const double sigma = random.uniform(0.3, 1.5);
     Eigen::Vector3d m = measure(camera, point, random.uniform(0, 1) < right_share);
-    for (int k = 0; k < 3; ++k) m[k] += sigma * random.normal();
+    for (int k = 0; k < 3; ++k) m[k] += sigma * random.gaussian();
     const bool outlier = random.uniform(0, 1) < outlier_share;
-    if (outlier) m.head<2>() += random.uniform(25, 120) * random.unit().head<2>().normalized();
+    if (outlier) m.head<2>() += random.uniform(25, 120) * random.direction().head<2>().normalized();
     scene.observations.push_back({inverse(scene.truth) * point, m, sigma});
     scene.is_outlier.push_back(outlier);
   }
@@ -122,7 +122,7 @@ void check_against_ceres(const Calibrated<M>& camera, bool robust) {
   options.robust_rounds = robust ? 1 : 0;
   for (std::uint64_t seed = 0; seed < 5; ++seed) {
     const Scene scene = make_scene(camera, 150, robust ? 0.1 : 0, 0.6, seed);
-    const Rigid3d start = Random(seed + 100).pose(0.03, 0.1) * scene.truth;
+    const Rigid3d start = Random(seed + 100).rigid(0.1, 0.03) * scene.truth;
     const auto ours = refine_pose(camera, start, scene.observations, options);
     const Rigid3d theirs = solve_with_ceres(camera, start, robust, scene.observations);
     CHECK(pose_scene::rotation_error(ours.cam_from_world, theirs) < 1e-8);
@@ -146,7 +146,7 @@ TEST_CASE("pose refinement sets 30 % outliers aside and reaches the truth", "[po
       constexpr int kScenes = 20;
       for (std::uint64_t seed = 0; seed < kScenes; ++seed) {
         const Scene scene = make_scene(camera, 300, 0.3, right_share, seed);
-        const Rigid3d start = Random(seed + 50).pose(0.05, 0.2) * scene.truth;
+        const Rigid3d start = Random(seed + 50).rigid(0.2, 0.05) * scene.truth;
         const auto result = refine_pose(camera, start, scene.observations, {});
         const double distance = mahalanobis(result, scene.truth);
         sum += distance;
@@ -174,7 +174,7 @@ TEST_CASE("pose refinement uses fisheye rays beyond 90 degrees", "[pose]") {
   std::erase_if(scene.observations,
                 [&](const PoseObservation& o) { return (scene.truth * o.point_in_world).z() > 0; });
   REQUIRE(scene.observations.size() > 20);
-  const Rigid3d start = Random(1).pose(0.05, 0.1) * scene.truth;
+  const Rigid3d start = Random(1).rigid(0.1, 0.05) * scene.truth;
   const auto result = refine_pose(camera, start, scene.observations, {});
   CHECK(result.inliers > 0.85 * static_cast<double>(scene.observations.size()));
   CHECK(mahalanobis(result, scene.truth) < 35);
@@ -195,7 +195,7 @@ TEST_CASE("pose refinement's information is the inverse of the scatter", "[pose]
     for (PoseObservation& o : observations) {
       const bool with_right = !std::isnan(o.measurement.z());
       o.measurement = measure(camera, scene.truth * o.point_in_world, with_right);
-      for (int k = 0; k < 3; ++k) o.measurement[k] += o.sigma * random.normal();
+      for (int k = 0; k < 3; ++k) o.measurement[k] += o.sigma * random.gaussian();
     }
     // No outliers: a threshold beyond reach keeps every observation.
     options.chi2_mono = options.chi2_stereo = 1e6;
@@ -214,7 +214,7 @@ TEST_CASE("pose refinement's information is the inverse of the scatter", "[pose]
 TEST_CASE("pose refinement returns the initial pose where it cannot do better", "[pose]") {
   const Camera camera = pose_scene::pinhole();
   const Scene scene = make_scene(camera, 50, 0, 0, 4);
-  const Rigid3d start = Random(7).pose(0.05, 0.1) * scene.truth;
+  const Rigid3d start = Random(7).rigid(0.1, 0.05) * scene.truth;
   const auto expect_initial = [&](std::vector<PoseObservation> observations) {
     const auto result = refine_pose(camera, start, observations, {});
     CHECK(result.cam_from_world.params == start.params);
@@ -245,7 +245,7 @@ TEST_CASE("pose refinement returns the initial pose where it cannot do better", 
 TEST_CASE("pose refinement leaves out what cannot be used", "[pose]") {
   const Camera camera = pose_scene::stereo();
   Scene scene = make_scene(camera, 100, 0, 0.5, 5);
-  const Rigid3d start = Random(8).pose(0.02, 0.1) * scene.truth;
+  const Rigid3d start = Random(8).rigid(0.1, 0.02) * scene.truth;
   const auto clean = refine_pose(camera, start, scene.observations, {});
   const std::size_t n = scene.observations.size();
   PoseObservation bad = scene.observations[0];
@@ -276,7 +276,7 @@ TEST_CASE("pose refinement of 2000 observations fits into a frame", "[pose]") {
   const Camera cameras[] = {pose_scene::stereo(), pose_scene::fisheye()};
   for (const Camera& camera : cameras) {
     const Scene scene = make_scene(camera, 2000, 0.2, 0.7, 6);
-    const Rigid3d start = Random(9).pose(0.05, 0.2) * scene.truth;
+    const Rigid3d start = Random(9).rigid(0.2, 0.05) * scene.truth;
     double best_ms = std::numeric_limits<double>::infinity();
     for (int i = 0; i < 10; ++i) {
       const auto begin = std::chrono::steady_clock::now();

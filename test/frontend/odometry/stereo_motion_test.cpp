@@ -1,0 +1,159 @@
+#include "frontend/odometry/stereo_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+#include "test/frontend/pose/pose_scene.h"
+#include "test/support/random.h"
+
+namespace hybrid_slam {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+struct Scene {
+  Calibrated<RectifiedStereo> camera = pose_scene::stereo();
+  Rigid3d truth;  // current_from_previous
+  std::vector<StereoCorrespondence> correspondences;
+  std::vector<char> is_outlier;
+
+  auto solve(const StereoOdometerOptions& options = {}) const {
+    return solve_stereo_motion(camera, correspondences, options);
+  }
+};
+
+struct SceneOptions {
+  int count = 300;
+  double outlier_share = 0;
+  double noise = 0;  // standard deviation of each coordinate [px]
+  double angle = 0.1;
+  double distance = 0.5;
+  std::uint64_t seed = 0;
+};
+
+Scene make_scene(const SceneOptions& options) {
+  Random random(options.seed);
+  Scene scene;
+  scene.truth = random.rigid(options.distance, options.angle);
+  const double* params = scene.camera.params.data();
+  while (static_cast<int>(scene.correspondences.size()) < options.count) {
+    const Eigen::Vector3d point(random.uniform(-15, 15), random.uniform(-5, 5),
+                                random.uniform(3, 25));
+    const Eigen::Vector3d moved = scene.truth * point;
+    Eigen::Vector3d before, after;
+    if (!RectifiedStereo::project(params, point.data(), before.data())) continue;
+    if (!RectifiedStereo::project(params, moved.data(), after.data())) continue;
+    if (!in_image(scene.camera, before.head<2>()) || !in_image(scene.camera, after.head<2>())) {
+      continue;
+    }
+    StereoCorrespondence c{before, {after[0], after[1], after[2], after[1]}};
+    for (int k = 0; k < 3; ++k) c.previous[k] += options.noise * random.gaussian();
+    for (int k = 0; k < 4; ++k) c.current[k] += options.noise * random.gaussian();
+    const bool outlier = random.uniform(0, 1) < options.outlier_share;
+    if (outlier) {
+      const double u = random.uniform(0, 1226), v = random.uniform(0, 370);
+      c.current = {u, v, u - random.uniform(1, 100), v};
+    }
+    scene.correspondences.push_back(c);
+    scene.is_outlier.push_back(outlier);
+  }
+  return scene;
+}
+
+TEST_CASE("stereo motion is exact without noise, large motions included", "[odometry]") {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Scene scene = make_scene({.angle = 0.7, .distance = 3, .seed = seed});
+    const auto found = scene.solve();
+    REQUIRE(found);
+    CHECK(found->inliers.size() == 300);
+    CHECK(pose_scene::rotation_error(found->current_from_previous, scene.truth) < 1e-7);
+    CHECK((found->current_from_previous.translation() - scene.truth.translation()).norm() < 1e-7);
+  }
+}
+
+TEST_CASE("stereo motion survives 40 % outliers", "[odometry]") {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Scene scene = make_scene(
+        {.outlier_share = 0.4, .noise = 0.3, .angle = 0.4, .distance = 0.5, .seed = seed});
+    const auto found = scene.solve();
+    REQUIRE(found);
+    CHECK(pose_scene::rotation_error(found->current_from_previous, scene.truth) < 0.002);
+    CHECK((found->current_from_previous.translation() - scene.truth.translation()).norm() < 0.03);
+    CHECK(std::is_sorted(found->inliers.begin(), found->inliers.end()));
+    int wrong = 0;
+    for (const int i : found->inliers) wrong += scene.is_outlier[static_cast<std::size_t>(i)];
+    CHECK(wrong == 0);
+    CHECK(found->inliers.size() > 120);
+  }
+}
+
+TEST_CASE("stereo motion without noise needs six points and no more", "[odometry]") {
+  int found_count = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Scene six = make_scene({.count = 6, .seed = seed});
+    const auto found = six.solve();
+    REQUIRE(found);
+    found_count += pose_scene::rotation_error(found->current_from_previous, six.truth) < 1e-6;
+    CHECK_FALSE(make_scene({.count = 5, .seed = seed}).solve());
+  }
+  CHECK(found_count == 20);
+  CHECK_FALSE(Scene{}.solve());
+}
+
+TEST_CASE("stereo motion leaves out what cannot be triangulated", "[odometry]") {
+  Scene scene = make_scene({.count = 60, .seed = 3});
+  const auto clean = scene.solve();
+  REQUIRE(clean);
+  const StereoCorrespondence good = scene.correspondences[0];
+  const std::size_t first = 10;
+  std::vector<StereoCorrespondence> bad(6, good);
+  bad[0].previous[2] = bad[0].previous[0];      // no disparity
+  bad[1].previous[2] = bad[1].previous[0] + 2;  // negative
+  bad[2].previous[1] = kNone;
+  bad[3].current[3] = kNone;
+  bad[4].current[2] = bad[4].current[0];
+  bad[5].previous[0] = std::numeric_limits<double>::infinity();
+  scene.correspondences.insert(scene.correspondences.begin() + first, bad.begin(), bad.end());
+  const auto found = scene.solve();
+  REQUIRE(found);
+  CHECK(found->inliers.size() == 60);
+  for (const int i : found->inliers) {
+    CHECK((static_cast<std::size_t>(i) < first || static_cast<std::size_t>(i) >= first + 6));
+  }
+  CHECK(pose_scene::rotation_error(found->current_from_previous, scene.truth) < 1e-7);
+}
+
+TEST_CASE("stereo motion refuses what leaves the motion open", "[odometry]") {
+  CHECK_FALSE(make_scene({.count = 100, .outlier_share = 1}).solve());
+  Scene same = make_scene({.count = 50});
+  std::fill(same.correspondences.begin(), same.correspondences.end(), same.correspondences[0]);
+  CHECK_FALSE(same.solve());
+  Scene nothing = make_scene({.count = 50});
+  for (StereoCorrespondence& c : nothing.correspondences) c.current.setConstant(kNone);
+  CHECK_FALSE(nothing.solve());
+}
+
+TEST_CASE("stereo motion repeats itself for the same seed", "[odometry]") {
+  const Scene scene = make_scene({.outlier_share = 0.4, .noise = 0.5, .seed = 12});
+  const auto first = scene.solve({.seed = 5});
+  const auto second = scene.solve({.seed = 5});
+  REQUIRE(first);
+  REQUIRE(second);
+  CHECK(first->current_from_previous.params == second->current_from_previous.params);
+  CHECK(first->inliers == second->inliers);
+}
+
+TEST_CASE("stereo motion's options are checked", "[odometry]") {
+  CHECK(StereoOdometerOptions{}.validate().empty());
+  CHECK_FALSE(StereoOdometerOptions{.ransac_iterations = 0}.validate().empty());
+  CHECK_FALSE(StereoOdometerOptions{.inlier_threshold = 0}.validate().empty());
+  CHECK_FALSE(StereoOdometerOptions{.inlier_threshold = kNone}.validate().empty());
+  CHECK_FALSE(StereoOdometerOptions{.min_inliers = 2}.validate().empty());
+  CHECK_FALSE(StereoOdometerOptions{.max_gauss_newton_iterations = 0}.validate().empty());
+}
+
+}  // namespace
+}  // namespace hybrid_slam
