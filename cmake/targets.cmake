@@ -38,9 +38,14 @@ function(hs_test name)
   catch_discover_tests(${name} TEST_SPEC "[slow]" TEST_SUFFIX " (slow)" PROPERTIES LABELS slow ${skip} TIMEOUT 3600)
 endfunction()
 
-# hs_benchmark(name SOURCES ... DEPENDS ...): a google-benchmark program in bin/.
+# hs_benchmark(name_benchmark SOURCES ... DEPENDS ...): a google-benchmark program in bin/, built by
+# the target "benchmarks".
 function(hs_benchmark name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS} benchmark::benchmark_main)
+  if(NOT TARGET benchmarks)
+    add_custom_target(benchmarks)
+  endif()
+  add_dependencies(benchmarks ${name})
 endfunction()
