@@ -18,11 +18,13 @@ struct BackendOptions {
 // Knows no threads; a pipeline gives it to one worker, and everyone else reads snapshots.
 class Backend {
  public:
+  // Throws std::invalid_argument if the options are not valid.
   explicit Backend(const BackendOptions& options);
 
   CameraId add_camera(const Camera& camera);
   KeyframeId add(const NewKeyframe& keyframe);
   void apply(const MapEdit& edit);
+  void set_keep(KeyframeId id);  // exempt from culling
 
   // Local bundle adjustment around a keyframe; outlier observations are erased from the map.
   // Between iterations it looks at `stop` and keeps what it has when stopped.
@@ -36,6 +38,8 @@ class Backend {
   const Map& map() const { return map_; }
 
  private:
+  BundleSummary optimize(const ProblemConfig& config, const std::stop_token& stop);
+
   BackendOptions options_;
   Map map_;
 };

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+
+#include "backend/map/map_snapshot.h"
+#include "backend/problem/problem_config.h"
+
+namespace hybrid_slam {
+
+struct LocalBundleOptions {
+  int min_shared_landmarks = 15;    // of a covisible keyframe that varies too
+  std::size_t max_neighbours = 20;  // those with most landmarks in common
+  std::size_t max_fixed = 60;       // outer observers, those with most observations
+  ProblemOptions problem;
+};
+
+// Local bundle adjustment: the keyframe and its covisible ones vary (stereo and fisheye mixed), and
+// so do all landmarks they see; other keyframes that see these landmarks are fixed, and so is the
+// origin. Where neither exists, the oldest keyframe is fixed instead. Empty if the keyframe is not
+// in the map.
+ProblemConfig make_local_bundle(const MapSnapshot& map, KeyframeId around,
+                                const LocalBundleOptions& options);
+
+}  // namespace hybrid_slam
