@@ -3,10 +3,10 @@
 
 #include <Eigen/Cholesky>
 
+#include "cameras/calibration_file.h"
 #include "frontend/input/file_sequence.h"
 #include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"
-#include "frontend/input/yaml_file.h"
 
 // UWslam: hybrid/<sequence>/images/raw/<number>_{left,right,fish}.<png|jpg> with camera_poses.txt
 // and hybrid/calibration/; stereo/images/<number>_{0,1}.<png|jpg> with gt_poses.txt and
@@ -18,8 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double kMaxRelativeDifference = 1e-6;  // between the two cameras of a rectified pair
-constexpr double kClearEvidence = 2;             // ratio of implausibilities that decides
+constexpr double kClearEvidence = 2;  // ratio of implausibilities that decides
 
 bool is_uwslam_sequence(const fs::path& folder) {
   if (!fs::is_directory(folder / "images")) return false;
@@ -62,45 +61,15 @@ ImageLists list_images(const fs::path& folder) {
   return lists;
 }
 
-struct RosCamera {
-  ImageSize size;
-  std::vector<double> projection;  // 3x4, row-major
-};
-
-RosCamera read_camera(const fs::path& path) {
-  const YAML::Node root = read_yaml(path);
-  if (!root["projection_matrix"].IsMap()) {
-    throw InputError(path.string() + ": projection_matrix: missing");
-  }
-  const auto side = [&](const char* key) {
-    const double value = parse_number(yaml_text(root, key, path), path, root[key].Mark().line + 1);
-    if (!(value >= 1 && value <= 65536)) {
-      throw InputError(path.string() + ": " + key + ": impossible");
-    }
-    return static_cast<int>(value);
-  };
-  RosCamera camera;
-  camera.size = {side("image_width"), side("image_height")};
-  camera.projection = yaml_numbers(root["projection_matrix"], "data", 12, path);
-  return camera;
-}
-
 Calibrated<RectifiedStereo> read_calibration(const fs::path& folder) {
   const fs::path own = folder / "calibration";
   const fs::path shared = fs::absolute(folder / ".." / "calibration").lexically_normal();
   const fs::path& place = fs::is_directory(own) ? own : shared;
-  const RosCamera left = read_camera(place / "left_camera.yaml");
-  const RosCamera right = read_camera(place / "right_camera.yaml");
-  const std::string source = place.string();
-  if (left.size != right.size) throw InputError(source + ": the two cameras differ in image size");
-  const std::vector<double>& p = left.projection;
-  const std::vector<double>& q = right.projection;
-  for (const std::size_t i : {0, 2, 5, 6}) {
-    if (!(std::abs(p[i] - q[i]) <= kMaxRelativeDifference * std::abs(p[i]))) {
-      throw InputError(source + ": the projection matrices are not those of a rectified pair");
-    }
-  }
-  return make_stereo_camera(p[0], p[5], p[2], p[6], (p[3] - q[3]) / p[0], left.size, source);
+  const auto camera = read_ros_stereo((place / "left_camera.yaml").string(),
+                                      (place / "right_camera.yaml").string());
+  const auto& [fx, fy, cx, cy, baseline] = camera.params;
+  return make_stereo_camera(fx, fy, cx, cy, baseline, {camera.width, camera.height},
+                            place.string());
 }
 
 // The poses of both cameras as camera_poses.txt has them, whatever they mean.
