@@ -76,6 +76,7 @@ KeyframeId Map::add_keyframe(const NewKeyframe& made) {
   keyframe.observations = made.observations;
   keyframe.cam_from_world = made.cam_from_world;
   keyframe.landmarks.resize(made.observations->size());
+  tables.newest_frame_index = std::max(tables.newest_frame_index, made.observations->frame_index);
   if (!tables.origin.valid()) {
     tables.origin = id;
     keyframe.keep = true;

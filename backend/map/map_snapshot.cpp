@@ -46,6 +46,21 @@ std::vector<LandmarkId> MapSnapshot::landmark_ids() const {
   return ids;
 }
 
+const Keyframe* MapSnapshot::find_frame(CameraId camera, std::int64_t frame_index) const {
+  for (std::uint32_t id = tables_.next_keyframe; id-- > 0;) {
+    const Keyframe* keyframe = find(KeyframeId(id));
+    if (keyframe == nullptr) continue;
+    if (keyframe->observations->frame_index < frame_index) return nullptr;
+    if (keyframe->observations->frame_index == frame_index &&
+        keyframe->observations->camera == camera) {
+      return keyframe;
+    }
+  }
+  return nullptr;
+}
+
+std::int64_t MapSnapshot::newest_frame_index() const { return tables_.newest_frame_index; }
+
 Rigid3d MapSnapshot::cam_from_world(KeyframeId id) const {
   if (const Keyframe* keyframe = find(id)) return keyframe->cam_from_world;
   Rigid3d cam_from_ancestor;

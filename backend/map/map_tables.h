@@ -27,11 +27,12 @@ struct MapTables {
   KeyframeId origin;
   std::uint32_t next_keyframe = 0;
   std::uint32_t next_landmark = 0;
+  std::int64_t newest_frame_index = -1;  // of any keyframe ever added
 
   // A complete copy that costs next to nothing; see PersistentTable::share().
   MapTables share() {
     return {cameras, keyframes.share(), landmarks.share(), erased.share(),
-            origin,  next_keyframe,     next_landmark};
+            origin,  next_keyframe,     next_landmark,     newest_frame_index};
   }
 };
 

@@ -83,6 +83,30 @@ TEST_CASE("The first keyframe is the origin and its stereo points are born") {
   CHECK(tiny.consistent());
 }
 
+TEST_CASE("A keyframe is found by its frame until it is erased") {
+  TinyMap tiny(true);
+  CHECK(tiny.view().newest_frame_index() == -1);
+  std::vector<KeyframeId> added;
+  for (const int frame : {0, 4, 9}) {
+    NewKeyframe made = tiny.frame(3);
+    auto observations = std::make_shared<FrameObservations>(*made.observations);
+    observations->frame_index = frame;
+    made.observations = observations;
+    added.push_back(tiny.map.add_keyframe(made));
+  }
+  const CameraId camera = tiny.view().at(added[0]).observations->camera;
+  CHECK(tiny.view().newest_frame_index() == 9);
+  REQUIRE(tiny.view().find_frame(camera, 4) != nullptr);
+  CHECK(tiny.view().find_frame(camera, 4)->id == added[1]);
+  CHECK(tiny.view().find_frame(camera, 5) == nullptr);
+  CHECK(tiny.view().find_frame(CameraId(7), 4) == nullptr);
+  MapEdit edit;
+  edit.erased_keyframes = {added[2]};
+  tiny.map.apply(edit);
+  CHECK(tiny.view().find_frame(camera, 9) == nullptr);
+  CHECK(tiny.view().newest_frame_index() == 9);
+}
+
 TEST_CASE("A mono keypoint alone gives no landmark") {
   TinyMap tiny(false);
   NewKeyframe made = tiny.frame(3);
