@@ -1,0 +1,121 @@
+#include "frontend/mapping/culling.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace hybrid_slam {
+namespace {
+
+constexpr double kSameScale = 1.26;  // a third of an octave: SIFT's step between scales
+
+int weighted_observations(const MapSnapshot& map, const Landmark& landmark) {
+  int count = 0;
+  for (const Observation& observation : landmark.observations) {
+    const auto& observations = *map.at(observation.keyframe).observations;
+    count += observations.has_right(observation.keypoint) ? 2 : 1;
+  }
+  return count;
+}
+
+// Do enough other keyframes, all but `erased`, see the landmark at the same or a finer scale?
+bool seen_elsewhere(const MapSnapshot& map, const Landmark& landmark, KeyframeId keyframe,
+                    double scale, const std::vector<KeyframeId>& erased, int enough) {
+  int observers = 0;
+  for (const Observation& observation : landmark.observations) {
+    if (observation.keyframe == keyframe ||
+        std::find(erased.begin(), erased.end(), observation.keyframe) != erased.end()) {
+      continue;
+    }
+    const auto& features = map.at(observation.keyframe).observations->features;
+    if (features.keypoints[observation.keypoint].scale <= kSameScale * scale &&
+        ++observers >= enough) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
+                  const std::vector<KeyframeId>& erased, const CullingOptions& options) {
+  const double stereo_baseline = baseline(map.camera(keyframe));
+  const double max_depth = stereo_baseline > 0 ? options.close_baselines * stereo_baseline
+                                               : std::numeric_limits<double>::infinity();
+  int counted = 0;
+  int redundant = 0;
+  for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    const Landmark* landmark =
+        keyframe.landmarks[i].valid() ? map.find(keyframe.landmarks[i]) : nullptr;
+    if (landmark == nullptr ||
+        (keyframe.cam_from_world * landmark->point_in_world).norm() > max_depth) {
+      continue;
+    }
+    ++counted;
+    const double scale = keyframe.observations->features.keypoints[i].scale;
+    redundant +=
+        seen_elsewhere(map, *landmark, keyframe.id, scale, erased, options.redundant_observers) ? 1
+                                                                                                : 0;
+  }
+  return counted > 0 && redundant > options.redundant_share * counted;
+}
+
+}  // namespace
+
+std::string CullingOptions::validate() const {
+  if (min_found_ratio < 0 || min_found_ratio > 1 || min_observations < 1 || probation < 1 ||
+      redundant_share <= 0 || redundant_share > 1 || redundant_observers < 1 ||
+      close_baselines <= 0) {
+    return "culling: a value is out of range";
+  }
+  return {};
+}
+
+void LandmarkProbation::admit(const MapSnapshot& map, KeyframeId keyframe) {
+  const Keyframe* found = keyframe.valid() ? map.find(keyframe) : nullptr;
+  if (found == nullptr) {
+    return;
+  }
+  LandmarkId newest = newest_known_;
+  for (const LandmarkId id : found->landmarks) {
+    if (id.valid() && (!newest_known_.valid() || id > newest_known_)) {
+      recent_.push_back({id, keyframe == previous_ ? 0 : -1});
+      newest = newest.valid() ? std::max(newest, id) : id;
+    }
+  }
+  newest_known_ = newest;
+}
+
+MapEdit LandmarkProbation::cull(const MapSnapshot& map, KeyframeId newest) {
+  admit(map, previous_);  // those that mapping made after the previous call
+  admit(map, newest);
+  previous_ = newest;
+  MapEdit edit;
+  std::erase_if(recent_, [&](Recent& recent) {
+    const Landmark* landmark = map.find(recent.id);
+    if (landmark == nullptr) {
+      return true;
+    }
+    ++recent.keyframes;
+    const bool unseen = landmark->found < options_.min_found_ratio * landmark->visible;
+    const bool weak = recent.keyframes >= options_.probation &&
+                      weighted_observations(map, *landmark) < options_.min_observations;
+    if (unseen || weak) {
+      edit.erased_landmarks.push_back(recent.id);
+    }
+    return unseen || weak || recent.keyframes > options_.probation;
+  });
+  return edit;
+}
+
+MapEdit cull_keyframes(const MapSnapshot& map, KeyframeId keyframe, const CullingOptions& options) {
+  MapEdit edit;
+  for (const Covisible& covisible : map.at(keyframe).covisible) {
+    const Keyframe& candidate = map.at(covisible.id);
+    if (candidate.id != map.origin() && !candidate.keep &&
+        is_redundant(map, candidate, edit.erased_keyframes, options)) {
+      edit.erased_keyframes.push_back(candidate.id);
+    }
+  }
+  return edit;
+}
+
+}  // namespace hybrid_slam
