@@ -1,0 +1,35 @@
+#include "frontend/tracking/keyframe_policy.h"
+
+namespace hybrid_slam {
+
+std::string KeyframePolicyOptions::validate() const {
+  if (min_tracked_ratio <= 0 || min_tracked_ratio > 1 || min_tracked_ratio_young <= 0 ||
+      min_tracked_ratio_young > 1) {
+    return "keyframes: tracked ratios must lie in (0, 1]";
+  }
+  if (min_inliers < 0 || min_close_tracked < 0 || min_close_untracked < 0 ||
+      max_frames_between < 1 || min_motion < 0) {
+    return "keyframes: counts must not be negative, max_frames_between at least 1";
+  }
+  return {};
+}
+
+bool needs_keyframe(const KeyframeEvidence& evidence, int max_features,
+                    const KeyframePolicyOptions& options) {
+  if (evidence.by_odometry) {
+    return true;  // the map does not reach here: grow it
+  }
+  if (evidence.inliers <= options.min_inliers) {
+    return false;
+  }
+  const double min_ratio =
+      evidence.keyframes < 2 ? options.min_tracked_ratio_young : options.min_tracked_ratio;
+  const bool weak = evidence.inliers < min_ratio * evidence.reference_landmarks;
+  const bool needs_close = evidence.close_tracked < options.min_close_tracked * max_features &&
+                           evidence.close_untracked > options.min_close_untracked;
+  const bool due = evidence.frames_since_keyframe >= options.max_frames_between &&
+                   evidence.motion > options.min_motion;
+  return weak || needs_close || due;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,188 @@
+#include "frontend/tracking/relocalization.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/matching/brute_force.h"
+
+namespace hybrid_slam {
+namespace {
+
+struct Correspondences {
+  std::vector<std::size_t> keypoint;
+  std::vector<Eigen::Vector3d> bearings;
+  std::vector<Eigen::Vector3d> points_in_world;
+  std::vector<double> angular_sigma;
+};
+
+Correspondences make_correspondences(const MapSnapshot& map, const FeatureView& view,
+                                     const std::vector<LandmarkId>& landmarks) {
+  Correspondences result;
+  const double focal = focal_length(view.camera);
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const Landmark* landmark = landmarks[i].valid() ? map.find(landmarks[i]) : nullptr;
+    const Keypoint& keypoint = view.features.keypoints[i];
+    const auto bearing = unproject(view.camera, Eigen::Vector2d(keypoint.x, keypoint.y));
+    if (landmark != nullptr && bearing) {
+      result.keypoint.push_back(i);
+      result.bearings.push_back(*bearing);
+      result.points_in_world.push_back(landmark->point_in_world);
+      result.angular_sigma.push_back(keypoint.sigma / focal);
+    }
+  }
+  return result;
+}
+
+// Optimises the pose and drops the landmarks that do not agree with it.
+int refine_and_prune(const MapSnapshot& map, const FeatureView& view,
+                     const PoseRefinementOptions& options, RelocalizedFrame& frame) {
+  std::vector<std::size_t> keypoint;
+  const auto observations =
+      pose_observations(map, view.features, view.u_right, frame.landmarks, keypoint);
+  const auto refined = refine_pose(view.camera, frame.cam_from_world, observations, options);
+  frame.cam_from_world = refined.cam_from_world;
+  frame.inliers = refined.inliers;
+  for (std::size_t i = 0; i < keypoint.size(); ++i) {
+    if (!refined.inlier[i]) {
+      frame.landmarks[keypoint[i]] = LandmarkId();
+    }
+  }
+  return frame.inliers;
+}
+
+// Searches the landmarks of the keyframe and its neighbours inside windows around their
+// projections.
+void search_around(const MapSnapshot& map, const FeatureView& view,
+                   ProjectionMatcherOptions matcher, double radius, RelocalizedFrame& frame) {
+  std::vector<LandmarkId> ids;
+  const auto append = [&](KeyframeId keyframe) {
+    for (const LandmarkId id : map.at(keyframe).landmarks) {
+      if (id.valid()) {
+        ids.push_back(id);
+      }
+    }
+  };
+  append(frame.keyframe);
+  for (const Covisible& covisible : map.covisible(frame.keyframe, 15, 10)) {
+    append(covisible.id);
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  std::vector<char> taken(view.features.size(), 0);
+  for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (frame.landmarks[i].valid()) {
+      taken[i] = 1;
+      const auto found = std::lower_bound(ids.begin(), ids.end(), frame.landmarks[i]);
+      if (found != ids.end() && *found == frame.landmarks[i]) {
+        ids.erase(found);
+      }
+    }
+  }
+  matcher.radius = radius;
+  const auto predictions =
+      predict_landmarks(map, view.camera, frame.cam_from_world, ids, matcher.max_view_angle_deg);
+  for (const ProjectionMatch& match : match_predictions(map, view, predictions, &taken, matcher)) {
+    frame.landmarks[static_cast<std::size_t>(match.keypoint)] = match.landmark;
+  }
+}
+
+std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const FeatureView& view,
+                                             KeyframeId id, const ProjectionMatcherOptions& matcher,
+                                             const PoseRefinementOptions& pose,
+                                             const RelocalizationOptions& options) {
+  const auto matched =
+      match_keyframe(map, id, view.features, options.ratio, options.max_descriptor_distance);
+  const Correspondences pairs = make_correspondences(map, view, matched);
+  if (pairs.keypoint.size() < static_cast<std::size_t>(options.min_matches)) {
+    return std::nullopt;
+  }
+  const auto pnp =
+      solve_pnp_ransac(pairs.bearings, pairs.points_in_world, pairs.angular_sigma, options.ransac);
+  if (!pnp) {
+    return std::nullopt;
+  }
+  RelocalizedFrame frame{pnp->cam_from_world, id, std::vector<LandmarkId>(view.features.size()), 0};
+  for (std::size_t i = 0; i < pairs.keypoint.size(); ++i) {
+    if (pnp->inlier[i]) {
+      frame.landmarks[pairs.keypoint[i]] = matched[pairs.keypoint[i]];
+    }
+  }
+  if (refine_and_prune(map, view, pose, frame) < options.ransac.min_inliers) {
+    return std::nullopt;
+  }
+  for (const double radius : {options.wide_radius, options.narrow_radius}) {
+    search_around(map, view, matcher, radius, frame);
+    refine_and_prune(map, view, pose, frame);
+  }
+  if (frame.inliers < options.min_inliers) {
+    return std::nullopt;
+  }
+  return frame;
+}
+
+}  // namespace
+
+std::vector<LandmarkId> match_keyframe(const MapSnapshot& map, KeyframeId keyframe,
+                                       const FeatureSet& features, double ratio,
+                                       double max_descriptor_distance) {
+  const Keyframe& reference = map.at(keyframe);
+  const FeatureSet& stored = reference.observations->features;
+  std::vector<LandmarkId> result(features.size());
+  if (stored.kind != features.kind) {
+    return result;  // descriptors of different kinds say nothing about one another
+  }
+  std::vector<LandmarkId> ids;
+  FeatureSet with_landmark;
+  with_landmark.kind = stored.kind;
+  for (std::size_t i = 0; i < reference.landmarks.size(); ++i) {
+    if (reference.landmarks[i].valid()) {
+      ids.push_back(reference.landmarks[i]);
+      with_landmark.keypoints.push_back(stored.keypoints[i]);
+      with_landmark.descriptors.push_back(stored.descriptors[i]);
+    }
+  }
+  BruteForceOptions options;
+  options.ratio = ratio;
+  options.max_descriptor_distance = max_descriptor_distance;
+  for (const DescriptorMatch& match : match_brute_force(with_landmark, features, options)) {
+    result[static_cast<std::size_t>(match.train)] = ids[static_cast<std::size_t>(match.query)];
+  }
+  return result;
+}
+
+std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const FeatureSet& features,
+                                               const std::vector<float>& u_right,
+                                               const std::vector<LandmarkId>& landmarks,
+                                               std::vector<std::size_t>& keypoint) {
+  std::vector<PoseObservation> observations;
+  keypoint.clear();
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const Landmark* landmark = landmarks[i].valid() ? map.find(landmarks[i]) : nullptr;
+    if (landmark == nullptr) {
+      continue;
+    }
+    const Keypoint& measured = features.keypoints[i];
+    observations.push_back({landmark->point_in_world,
+                            {measured.x, measured.y, u_right.empty() ? kNoRightMatch : u_right[i]},
+                            measured.sigma});
+    keypoint.push_back(i);
+  }
+  return observations;
+}
+
+std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const FeatureView& view,
+                                           const ProjectionMatcherOptions& matcher,
+                                           const PoseRefinementOptions& pose,
+                                           const RelocalizationOptions& options) {
+  const std::vector<KeyframeId> ids = map.keyframe_ids();
+  const std::size_t count = std::min(ids.size(), static_cast<std::size_t>(options.max_keyframes));
+  for (std::size_t i = 0; i < count; ++i) {
+    auto found = try_keyframe(map, view, ids[ids.size() - 1 - i], matcher, pose, options);
+    if (found) {
+      return found;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace hybrid_slam

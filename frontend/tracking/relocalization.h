@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "frontend/matching/projection_matcher.h"
+#include "frontend/pose/pnp_ransac.h"
+#include "frontend/pose/pose_refinement.h"
+
+namespace hybrid_slam {
+
+struct RelocalizationOptions {
+  int max_keyframes = 50;  // newest first
+  double ratio = 0.75;     // best against second best descriptor
+  double max_descriptor_distance = 0.7;
+  int min_matches = 15;
+  int min_inliers = 50;      // after guided search
+  double wide_radius = 10;   // [px]
+  double narrow_radius = 3;  // [px]
+  PnpRansacOptions ransac;
+};
+
+struct RelocalizedFrame {
+  Rigid3d cam_from_world;
+  KeyframeId keyframe;                // the one it was found in
+  std::vector<LandmarkId> landmarks;  // one per keypoint, inliers only
+  int inliers = 0;
+};
+
+// Descriptor matches between the landmarks of a keyframe and an image's features: one entry per
+// keypoint, invalid where nothing matches. None of `landmarks` need be in view.
+std::vector<LandmarkId> match_keyframe(const MapSnapshot& map, KeyframeId keyframe,
+                                       const FeatureSet& features, double ratio,
+                                       double max_descriptor_distance);
+
+// What refine_pose needs, for the keypoints that have a landmark in the map; `keypoint` receives
+// the index of each.
+std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const FeatureSet& features,
+                                               const std::vector<float>& u_right,
+                                               const std::vector<LandmarkId>& landmarks,
+                                               std::vector<std::size_t>& keypoint);
+
+// Finds an image in the map without any prediction: descriptors against keyframe after keyframe,
+// PnP in RANSAC, guided search. None if no keyframe yields min_inliers.
+std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const FeatureView& view,
+                                           const ProjectionMatcherOptions& matcher,
+                                           const PoseRefinementOptions& pose,
+                                           const RelocalizationOptions& options);
+
+}  // namespace hybrid_slam

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backend/map/map_edit.h"
+#include "backend/map/map_snapshot.h"
+#include "frontend/matching/projection_matcher.h"
+#include "frontend/odometry/stereo_odometer.h"
+#include "frontend/pose/pose_refinement.h"
+#include "frontend/tracking/frame.h"
+#include "frontend/tracking/keyframe_policy.h"
+#include "frontend/tracking/local_map.h"
+#include "frontend/tracking/relocalization.h"
+#include "frontend/tracking/track_refinement.h"
+
+namespace hybrid_slam {
+
+struct StereoTrackerOptions {
+  int max_features = 2000;          // N below
+  double min_initial_share = 0.08;  // of N: features, and features with depth, to start the map
+  double close_baselines = 40;   // nearer than this many baselines, one stereo pair fixes a point
+  int min_new_points = 100;      // a keyframe makes at least the nearest ones
+  double last_frame_radius = 7;  // [px]; doubled when few match
+  double last_frame_retry_share = 0.08;  // of N
+  double last_frame_min_share = 0.06;    // of N
+  int min_reference_matches = 30;
+  int min_pose_inliers = 10;
+  double local_map_radius = 3;  // [px]
+  int min_local_map_inliers = 30;
+  int min_odometer_inliers = 20;  // to go on by odometry where the map does not hold
+  StereoOdometerOptions odometer;
+  ProjectionMatcherOptions matcher;
+  PoseRefinementOptions pose;
+  LocalMapOptions local_map;
+  KeyframePolicyOptions keyframes;
+  RelocalizationOptions relocalization;
+  TrackRefinementOptions refinement;
+
+  std::string validate() const;
+};
+
+enum class PoseSource { kNone, kInitialization, kLocalMap, kOdometer, kRelocalization };
+enum class Prediction { kNone, kOdometer, kConstantVelocity, kLastPose };
+
+const char* to_string(PoseSource source);
+const char* to_string(Prediction prediction);
+
+// What tracking says of one frame.
+struct TrackedFrame {
+  std::int64_t frame_index = 0;
+  double time = 0;  // [s]
+  PoseSource source = PoseSource::kNone;
+  Prediction prediction = Prediction::kNone;
+  Rigid3d cam_from_world;      // as known at this moment
+  KeyframeId reference;        // invalid for the frame that starts the map
+  Rigid3d cam_from_reference;  // through which the frame follows later corrections
+  int odometer_inliers = 0;
+  int last_frame_inliers = 0;
+  int inliers = 0;  // landmarks that agree with the final pose
+
+  std::optional<NewKeyframe> keyframe;  // set if the frame shall become one
+  MapEdit counts;                       // found and visible landmarks
+
+  bool tracked() const { return source != PoseSource::kNone; }
+};
+
+// Tracks stereo frames one after the other against snapshots of the map (steps 1 to 7 of the
+// paper's section on tracking). One thread at a time. It never changes the map: it says which
+// frames should become keyframes, and finds them in the next snapshot.
+class StereoTracker {
+ public:
+  // Throws std::invalid_argument if the options are not valid.
+  StereoTracker(CameraId camera_id, const Calibrated<RectifiedStereo>& camera,
+                const StereoTrackerOptions& options);
+
+  // `allow_keyframe`: false while mapping has more waiting than it can take.
+  TrackedFrame track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);
+
+ private:
+  void follow_map(const MapSnapshot& map);
+  TrackedFrame initialize(Frame& frame) const;
+  void predict(Frame& frame, TrackedFrame& result);
+  bool track_last_frame(Frame& frame, const MapSnapshot& map, TrackedFrame& result) const;
+  bool track_reference(Frame& frame, const MapSnapshot& map) const;
+  bool track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers, TrackedFrame& result);
+  bool relocalize(Frame& frame, const MapSnapshot& map, TrackedFrame& result);
+  int refine(Frame& frame, const MapSnapshot& map) const;
+  bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
+  NewKeyframe make_keyframe(const Frame& frame) const;
+  FeatureView view_of(const Frame& frame) const;
+  double depth(const Frame& frame, std::size_t keypoint) const;
+  int share_of_features(const Frame& frame, double share) const;
+  void remember(Frame frame, const TrackedFrame& result);
+
+  CameraId camera_id_;
+  Calibrated<RectifiedStereo> stereo_;
+  Camera camera_;
+  StereoTrackerOptions options_;
+  StereoOdometer odometer_;
+  TrackRefiner refiner_;
+
+  std::optional<Frame> last_;  // the previous frame, tracked or not
+  bool last_tracked_ = false;
+  KeyframeId reference_;  // of the last tracked frame
+  Rigid3d last_from_reference_;
+  std::optional<Rigid3d> velocity_;  // current_from_previous of the last step
+  std::optional<std::int64_t>
+      requested_keyframe_;  // frame asked to become one, not yet seen in the map
+  std::int64_t last_keyframe_frame_ = 0;
+};
+
+}  // namespace hybrid_slam

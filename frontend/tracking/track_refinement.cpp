@@ -1,0 +1,148 @@
+#include "frontend/tracking/track_refinement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+namespace hybrid_slam {
+namespace {
+
+// Pixel offsets between two views of a small plane at a point, seen head-on by the reference: what
+// a step of one reference pixel becomes in the target.
+std::optional<Eigen::Matrix2d> patch_warp(const Camera& camera,
+                                          const Rigid3d& target_from_reference,
+                                          const Eigen::Vector2d& reference_pixel,
+                                          const Eigen::Vector3d& point_in_reference) {
+  constexpr double kStep = 3;  // [px]
+  const Eigen::Vector3d normal = point_in_reference.normalized();
+  const double distance = point_in_reference.norm();
+  Eigen::Matrix2d warp;
+  for (int axis = 0; axis < 2; ++axis) {
+    Eigen::Vector2d ends[2];
+    for (int side = 0; side < 2; ++side) {
+      Eigen::Vector2d pixel = reference_pixel;
+      pixel[axis] += side == 0 ? -kStep : kStep;
+      const auto ray = unproject(camera, pixel);
+      if (!ray || ray->dot(normal) < 0.1) {
+        return std::nullopt;
+      }
+      const auto seen = project(
+          camera, target_from_reference * Eigen::Vector3d(*ray * (distance / ray->dot(normal))));
+      if (!seen) {
+        return std::nullopt;
+      }
+      ends[side] = *seen;
+    }
+    warp.col(axis) = (ends[1] - ends[0]) / (2 * kStep);
+  }
+  return warp;
+}
+
+}  // namespace
+
+struct TrackRefiner::Reference {
+  const ImagePyramid* image = nullptr;
+  const Keyframe* keyframe = nullptr;
+  const Keypoint* keypoint = nullptr;
+};
+
+std::string TrackRefinementOptions::validate() const {
+  if (keyframes < 1 || min_sigma <= 0 || max_view_angle_deg <= 0) {
+    return "refinement: keyframes, min_sigma and max_view_angle_deg must be positive";
+  }
+  return alignment.validate();
+}
+
+TrackRefiner::TrackRefiner(CameraId camera_id, const Camera& camera,
+                           const TrackRefinementOptions& options)
+    : camera_id_(camera_id), camera_(camera), options_(options) {}
+
+void TrackRefiner::remember(const Frame& frame) {
+  if (!options_.enabled || !frame.left) {
+    return;
+  }
+  images_.emplace_back(frame.index, frame.left);
+  if (images_.size() > static_cast<std::size_t>(options_.keyframes)) {
+    images_.pop_front();
+  }
+}
+
+const ImagePyramid* TrackRefiner::image_of(std::int64_t frame_index) const {
+  const auto at =
+      std::lower_bound(images_.begin(), images_.end(), frame_index,
+                       [](const auto& entry, std::int64_t index) { return entry.first < index; });
+  return at != images_.end() && at->first == frame_index ? at->second.get() : nullptr;
+}
+
+// The oldest observation whose image is still here.
+bool TrackRefiner::find_reference(const MapSnapshot& map, const Landmark& landmark,
+                                  Reference& reference) const {
+  for (const Observation& observation : landmark.observations) {
+    const Keyframe& keyframe = map.at(observation.keyframe);
+    if (keyframe.observations->camera != camera_id_) {
+      continue;
+    }
+    reference.image = image_of(keyframe.observations->frame_index);
+    if (reference.image != nullptr) {
+      reference.keyframe = &keyframe;
+      reference.keypoint = &keyframe.observations->features.keypoints[observation.keypoint];
+      return true;
+    }
+  }
+  return false;
+}
+
+bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landmark,
+                                   std::size_t index, Frame& frame) const {
+  Reference reference;
+  if (!find_reference(map, landmark, reference)) {
+    return false;
+  }
+  const Rigid3d target_from_reference =
+      frame.cam_from_world * inverse(reference.keyframe->cam_from_world);
+  const Eigen::Vector3d point_in_reference =
+      reference.keyframe->cam_from_world * landmark.point_in_world;
+  const Eigen::Vector3d point_in_target = target_from_reference * point_in_reference;
+  const double view_cosine = (target_from_reference.rotation() * point_in_reference)
+                                 .normalized()
+                                 .dot(point_in_target.normalized());
+  if (view_cosine < std::cos(options_.max_view_angle_deg * std::numbers::pi / 180)) {
+    return false;
+  }
+  const Eigen::Vector2d center(reference.keypoint->x, reference.keypoint->y);
+  const auto warp = patch_warp(camera_, target_from_reference, center, point_in_reference);
+  const auto patch = make_reference_patch(*reference.image, center.x(), center.y(),
+                                          reference.keypoint->scale, options_.alignment);
+  if (!warp || !patch) {
+    return false;
+  }
+  Keypoint& keypoint = frame.features.left.keypoints[index];
+  const Alignment aligned = align_patch(
+      *patch, *frame.left, *warp, Eigen::Vector2d(keypoint.x, keypoint.y), options_.alignment);
+  if (!aligned.converged) {
+    return false;
+  }
+  const auto shift = static_cast<float>(aligned.position.x()) - keypoint.x;
+  keypoint.x += shift;
+  keypoint.y = static_cast<float>(aligned.position.y());
+  keypoint.sigma = static_cast<float>(std::max(options_.min_sigma, aligned.sigma));
+  if (!frame.features.u_right.empty()) {
+    frame.features.u_right[index] += shift;  // the disparity stays
+  }
+  return true;
+}
+
+int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) const {
+  int refined = 0;
+  if (!options_.enabled || !frame.left) {
+    return refined;
+  }
+  for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {
+    const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
+    refined += landmark != nullptr && refine_keypoint(map, *landmark, i, frame) ? 1 : 0;
+  }
+  return refined;
+}
+
+}  // namespace hybrid_slam
