@@ -18,6 +18,9 @@ namespace {
 // pixel of the doubled image and keep its origin.
 constexpr float kUpsamplingOffset = 0.25F;
 
+// Where the uncertainty of a position begins to grow with the scale [px]; see SiftOptions.
+constexpr float kScaleOfGrowth = 4.0F;
+
 // Below this OpenCV has no octave to search.
 constexpr int kMinImageSize = 12;
 
@@ -103,7 +106,8 @@ class OpenCvSift final : public SiftExtractor {
     keypoint.angle = found.angle * static_cast<float>(std::numbers::pi / 180);
     if (keypoint.angle >= static_cast<float>(2 * std::numbers::pi)) keypoint.angle = 0;
     keypoint.response = found.response * 255;
-    keypoint.sigma = static_cast<float>(options_.keypoint_sigma) * keypoint.scale;
+    keypoint.sigma = static_cast<float>(options_.keypoint_sigma) *
+                     std::hypot(1.0F, keypoint.scale / kScaleOfGrowth);
     return keypoint;
   }
 

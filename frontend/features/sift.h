@@ -15,7 +15,12 @@ struct SiftOptions {
   double edge_threshold = 10;       // largest ratio of principal curvatures
   double initial_sigma = 1.6;       // blur of the first level [px]
   bool upsample = true;             // start with an octave at twice the resolution
-  double keypoint_sigma = 0.5;      // standard deviation of a position per pixel of scale [-]
+  // Standard deviation of a small feature's position [px]. That of a feature of scale s [px] is
+  // keypoint_sigma * sqrt(1 + (s / 4)^2): measured from the row differences of stereo matches, it
+  // does not grow in proportion to the scale but starts flat (rendered pairs: 0.09 px up to scale
+  // 4, 0.26 at 6.8, 0.38 at 9.5; KITTI: 0.32 at 0.85, 0.36 at 1.7, 0.46 at 3.4, 0.53 at 4.8, 0.68
+  // at 14). The default leaves room for change of view.
+  double keypoint_sigma = 0.5;
 
   // Empty if the values can be used, else what is wrong.
   std::string validate() const;

@@ -46,7 +46,7 @@ ImagePyramid::ImagePyramid(const GrayImage& image, int levels, double blur) {
   bytes.convertTo(pixels, CV_32F);
   cv::GaussianBlur(pixels, pixels, cv::Size(), blur);
   levels_.push_back(to_level(pixels));
-  while (this->levels() < levels && std::min(pixels.rows, pixels.cols) >= 2 * kMinLevelSize) {
+  while (this->levels() < levels && (std::min(pixels.rows, pixels.cols) + 1) / 2 >= kMinLevelSize) {
     pixels = halve(pixels, blur);
     levels_.push_back(to_level(pixels));
   }

@@ -15,6 +15,7 @@ using Level = ImagePyramid::Level;
 // Texture below this has no place: sum of squared gradients per sample [(grey levels / px)^2].
 constexpr double kMinGradientEnergy = 0.5;
 constexpr double kMaxGainRatio = 4;
+constexpr int kMaxHalfSize = 50;
 
 // Weights of Catmull-Rom interpolation at -1, 0, 1, 2 for t in [0, 1).
 std::array<float, 4> cubic_weights(float t) {
@@ -22,6 +23,36 @@ std::array<float, 4> cubic_weights(float t) {
   const float t3 = t2 * t;
   return {0.5F * (-t3 + 2 * t2 - t), 0.5F * (3 * t3 - 5 * t2 + 2), 0.5F * (-3 * t3 + 4 * t2 + t),
           0.5F * (t3 - t2)};
+}
+
+// The samples of a square of whole steps around (cx, cy), row by row: all share the same weights,
+// so that rows and columns can be interpolated one after the other.
+void sample_square(const Level& level, double cx, double cy, int half_size,
+                   std::vector<float>* samples) {
+  const double x = cx - half_size;
+  const double y = cy - half_size;
+  const int left = static_cast<int>(x);
+  const int top = static_cast<int>(y);
+  const std::array<float, 4> wx = cubic_weights(static_cast<float>(x - left));
+  const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top));
+  const int side = 2 * half_size + 1;
+  std::array<float, 2 * (kMaxHalfSize + 1) + 4> column;  // with the derivatives' rim
+  samples->clear();
+  samples->reserve(static_cast<std::size_t>(side * side));
+  for (int v = 0; v < side; ++v) {
+    const float* p0 = level.row(top - 1 + v) + (left - 1);
+    const float* p1 = p0 + level.width;
+    const float* p2 = p1 + level.width;
+    const float* p3 = p2 + level.width;
+    for (int u = 0; u < side + 3; ++u) {
+      column[static_cast<std::size_t>(u)] =
+          wy[0] * p0[u] + wy[1] * p1[u] + wy[2] * p2[u] + wy[3] * p3[u];
+    }
+    const float* c = column.data();
+    for (int u = 0; u < side; ++u, ++c) {
+      samples->push_back(wx[0] * c[0] + wx[1] * c[1] + wx[2] * c[2] + wx[3] * c[3]);
+    }
+  }
 }
 
 // Needs floor(x) in 1 .. width - 3 and floor(y) in 1 .. height - 3.
@@ -67,12 +98,17 @@ bool sample_target(const Level& level, int half_size, const Eigen::Matrix2d& war
                    const Eigen::Vector2d& centre, std::vector<float>* samples) {
   const Eigen::Vector2d reach = half_size * warp.cwiseAbs().rowwise().sum();
   if (!inside(level, centre.x(), centre.y(), reach.x(), reach.y())) return false;
-  std::size_t i = 0;
+  if (warp.isIdentity(0)) {
+    sample_square(level, centre.x(), centre.y(), half_size, samples);
+    remove_mean(samples);
+    return true;
+  }
+  samples->clear();
   for (int v = -half_size; v <= half_size; ++v) {
     for (int u = -half_size; u <= half_size; ++u) {
       const double x = centre.x() + warp(0, 0) * u + warp(0, 1) * v;
       const double y = centre.y() + warp(1, 0) * u + warp(1, 1) * v;
-      (*samples)[i++] = sample_cubic(level, x, y);
+      samples->push_back(sample_cubic(level, x, y));
     }
   }
   remove_mean(samples);
@@ -101,29 +137,20 @@ struct Solver {
   Eigen::Matrix3d inverse;
 };
 
-// How well the target's samples fit the patch at the final place, as gain * values.
-void judge(const ReferencePatch& patch, const Solver& solver, const Eigen::Matrix2d& warp,
-           const std::vector<float>& target, double pixel, Alignment* result) {
+// How well the target's samples fit gain * values.
+void judge(const ReferencePatch& patch, const std::vector<float>& target, Alignment* result) {
   const double tt = dot(target, target);
   const double rr = patch.normal(2, 2);
   const double tr = dot(target, patch.values);
   result->correlation = tt > 0 ? tr / std::sqrt(tt * rr) : 0;
-  const double gain = tr / rr;
-  const double squares = std::max(0.0, tt - gain * tr);
-  const auto count = static_cast<double>(target.size());
-  result->residual = std::sqrt(squares / count);
-  const Eigen::Matrix2d covariance =
-      warp * solver.inverse.topLeftCorner<2, 2>() * warp.transpose() * (squares / count);
-  const double half_trace = covariance.trace() / 2;
-  const double worst =
-      half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - covariance.determinant()));
-  result->sigma = gain > 0 ? pixel * std::sqrt(worst) / gain : 0;
+  const double squares = std::max(0.0, tt - tr * tr / rr);
+  result->residual = std::sqrt(squares / static_cast<double>(target.size()));
 }
 
 }  // namespace
 
 std::string AlignmentOptions::validate() const {
-  if (half_size < 1 || half_size > 50) return "half_size must lie in 1..50";
+  if (half_size < 1 || half_size > kMaxHalfSize) return "half_size must lie in 1..50";
   if (!(scale_of_level0 > 0)) return "scale_of_level0 must be positive";
   if (max_iterations < 1) return "max_iterations must be positive";
   if (!(convergence > 0) || !(max_shift > 0)) return "convergence and max_shift must be positive";
@@ -145,12 +172,7 @@ std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, do
 
   const int side = 2 * half + 3;  // one more all around for the derivatives
   std::vector<float> samples;
-  samples.reserve(static_cast<std::size_t>(side * side));
-  for (int v = -half - 1; v <= half + 1; ++v) {
-    for (int u = -half - 1; u <= half + 1; ++u) {
-      samples.push_back(sample_cubic(level, cx + u, cy + v));
-    }
-  }
+  sample_square(level, cx, cy, half + 1, &samples);
   for (int v = 1; v < side - 1; ++v) {
     for (int u = 1; u < side - 1; ++u) {
       const float* s = samples.data() + v * side + u;
@@ -188,7 +210,7 @@ Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
   if (!solver.inverse.allFinite()) return result;
   const Eigen::Vector2d first = start / pixel;
   Eigen::Vector2d centre = first;
-  std::vector<float> samples(patch.values.size());
+  std::vector<float> samples;
   for (int i = 0; i < options.max_iterations; ++i) {
     if (!sample_target(level, patch.half_size, warp, centre, &samples)) return result;
     const Eigen::Vector3d solution = solver.solve(patch, samples);
@@ -201,7 +223,7 @@ Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
     if (step.norm() > options.convergence) continue;
     if (!sample_target(level, patch.half_size, warp, centre, &samples)) return result;
     result.position = centre * pixel;
-    judge(patch, solver, warp, samples, pixel, &result);
+    judge(patch, samples, &result);
     result.converged = result.correlation >= options.min_correlation;
     return result;
   }

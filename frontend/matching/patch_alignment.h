@@ -11,8 +11,8 @@
 namespace hybrid_slam {
 
 struct AlignmentOptions {
-  int half_size = 5;             // the patch has (2 half_size + 1)^2 samples
-  double scale_of_level0 = 1.6;  // keypoint scale [px] for which the finest level is right
+  int half_size = 7;             // the patch has (2 half_size + 1)^2 samples
+  double scale_of_level0 = 3.2;  // keypoint scale [px] for which the finest level is right
   int max_iterations = 20;
   double convergence = 0.003;  // largest last step [px of the level]
   double max_shift = 2.0;      // from the start [px of the level]
@@ -45,7 +45,6 @@ struct Alignment {
   Eigen::Vector2d position{0, 0};  // of the patch's centre in the target image [px]
   double correlation = 0;          // zero-mean normalised, -1..1
   double residual = 0;             // root mean square [grey levels] after gain and bias
-  double sigma = 0;                // of the position's worst direction, from the residual [px]
 };
 
 // Finds the place in `target` that looks like the patch: inverse compositional Lucas-Kanade (Baker

@@ -78,9 +78,9 @@ TEST_CASE("The stereo matcher keeps to rows, disparities and scales that can be"
     return stereo.right_of_left[0] == 0;
   };
   CHECK(found(390, 100, 2));
-  CHECK(found(390, 101.4, 2));  // 1 + 3 * hypot(0.1, 0.1) = 1.424
-  CHECK_FALSE(found(390, 101.45, 2));
-  CHECK_FALSE(found(390, 98.55, 2));
+  CHECK(found(390, 101.12, 2));  // 1 + hypot(0.1, 0.1) = 1.141
+  CHECK_FALSE(found(390, 101.16, 2));
+  CHECK_FALSE(found(390, 98.84, 2));
   CHECK_FALSE(found(400, 100, 2));  // infinite depth
   CHECK_FALSE(found(401, 100, 2));
   CHECK(found(67, 100, 2));  // 500 / 1.5 = 333.3
