@@ -1,0 +1,95 @@
+#include "apps/io/report.h"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "apps/io/output_file.h"
+
+namespace hybrid_slam {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Smallest value that at least `percent` of all do not exceed.
+double percentile(const std::vector<double>& sorted, double percent) {
+  const double rank = std::ceil(percent / 100 * static_cast<double>(sorted.size()));
+  return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
+}
+
+}  // namespace
+
+void StageTimes::add(std::string_view stage, double milliseconds) {
+  const auto same = [&](const auto& entry) { return entry.first == stage; };
+  auto entry = std::find_if(stages_.begin(), stages_.end(), same);
+  if (entry == stages_.end()) {
+    stages_.emplace_back(stage, std::vector<double>());
+    entry = stages_.end() - 1;
+  }
+  entry->second.push_back(milliseconds);
+}
+
+void StageTimes::merge(const StageTimes& other) {
+  for (const auto& [stage, durations] : other.stages()) {
+    for (const double duration : durations) add(stage, duration);
+  }
+}
+
+Json to_json(const StageTimes& times) {
+  Json json = Json::object();
+  for (const auto& [stage, durations] : times.stages()) {
+    std::vector<double> sorted = durations;
+    std::sort(sorted.begin(), sorted.end());
+    double sum = 0;
+    for (const double duration : sorted) sum += duration;
+    json[stage] = {
+        {"count", sorted.size()},        {"mean", sum / static_cast<double>(sorted.size())},
+        {"p50", percentile(sorted, 50)}, {"p95", percentile(sorted, 95)},
+        {"p99", percentile(sorted, 99)}, {"max", sorted.back()}};
+  }
+  return json;
+}
+
+Json to_json(const ErrorStatistics& errors, double unit) {
+  return {{"rmse", unit * errors.rmse},
+          {"mean", unit * errors.mean},
+          {"median", unit * errors.median},
+          {"max", unit * errors.max},
+          {"count", errors.count}};
+}
+
+Json to_json(const AbsoluteError& error) {
+  Json json = {{"position_m", to_json(error.position)},
+               {"scale", error.truth_from_estimate.scale()},
+               {"estimated_length_m", error.estimated_length},
+               {"true_length_m", error.true_length}};
+  const std::optional<double> ratio = error.length_ratio();
+  json["length_ratio"] = ratio ? Json(*ratio) : Json();
+  return json;
+}
+
+Json to_json(const RelativeError& error) {
+  return {{"translation_m", to_json(error.translation)},
+          {"rotation_deg", to_json(error.rotation, 180 / std::numbers::pi)}};
+}
+
+void write_json(const std::filesystem::path& path, const Json& json) {
+  // Text from outside (a path, a warning) need not be valid UTF-8.
+  write_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+std::string blas_name() {
+  Dl_info info{};
+  const void* const dgemm = dlsym(RTLD_DEFAULT, "dgemm_");
+  if (dgemm == nullptr || dladdr(dgemm, &info) == 0 || info.dli_fname == nullptr) return "none";
+  std::error_code error;
+  const std::filesystem::path resolved = std::filesystem::canonical(info.dli_fname, error);
+  return error ? std::string(info.dli_fname) : resolved.string();
+}
+
+}  // namespace hybrid_slam

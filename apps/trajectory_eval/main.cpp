@@ -1,0 +1,177 @@
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <numbers>
+#include <string>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "apps/io/report.h"
+#include "apps/io/trajectory.h"
+#include "frontend/input/text_file.h"
+
+namespace hybrid_slam {
+namespace {
+
+enum ExitCode { kOk = 0, kInternalError = 1, kBadUsage = 2, kBadInput = 3 };
+
+constexpr const char* kDescription =
+    "Compares an estimated trajectory with the truth.\n"
+    "Files: TUM (t tx ty tz qx qy qz qw) or KITTI (3x4 row-major, no times), told by their "
+    "columns.\n"
+    "KITTI poses get the times of --times; without it they are paired by their number.";
+constexpr const char* kFooter =
+    "ate: distance between true and estimated positions after alignment of the whole\n"
+    "rpe: error of the motion over --delta pairs; translation and rotation\n"
+    "Exit codes: 0 ok, 1 internal error, 2 bad usage, 3 bad input.";
+
+struct Options {
+  std::string metric, estimate, truth, times;
+  std::string align = "se3";
+  double max_difference = 0.02;  // [s]
+  std::size_t delta = 1;
+  bool json = false;
+};
+
+void set_times(TrajectoryFile& file, const std::vector<double>& times, const Options& options) {
+  if (file.has_times) return;
+  if (times.size() < file.poses.size()) {
+    throw InputError(options.times + ": has " + std::to_string(times.size()) + " times for " +
+                     std::to_string(file.poses.size()) + " poses");
+  }
+  for (std::size_t i = 0; i < file.poses.size(); ++i) file.poses[i].time = times[i];
+  file.has_times = true;
+}
+
+// With times on one side only, poses are paired by number if there are as many on both.
+std::vector<PosePair> read_pairs(const Options& options) {
+  TrajectoryFile estimate = read_trajectory(options.estimate);
+  TrajectoryFile truth = read_trajectory(options.truth);
+  if (!options.times.empty()) {
+    const std::vector<double> times = read_times(options.times);
+    set_times(estimate, times, options);
+    set_times(truth, times, options);
+  }
+  if (estimate.has_times != truth.has_times) {
+    if (estimate.poses.size() != truth.poses.size()) {
+      throw InputError(
+          fmt::format("{}: {} poses, but {} has {} and one of them has no times; give "
+                      "--times",
+                      options.estimate, estimate.poses.size(), options.truth, truth.poses.size()));
+    }
+    for (std::size_t i = 0; i < truth.poses.size(); ++i) {
+      truth.poses[i].time = estimate.poses[i].time;
+    }
+  }
+  auto pairs = associate(estimate.poses, truth.poses, options.max_difference);
+  if (pairs.empty()) {
+    throw InputError(fmt::format("{}: no pose is within {} s of one of {}", options.estimate,
+                                 options.max_difference, options.truth));
+  }
+  return pairs;
+}
+
+void print(const char* name, const ErrorStatistics& errors, double unit, const char* unit_name) {
+  fmt::print("{:<12} rmse {:.6f}  mean {:.6f}  median {:.6f}  max {:.6f}  [{}] ({} values)\n", name,
+             unit * errors.rmse, unit * errors.mean, unit * errors.median, unit * errors.max,
+             unit_name, errors.count);
+}
+
+void print_ratio(const AbsoluteError& error) {
+  fmt::print("{:<12} estimate {:.4f} m, truth {:.4f} m", "path length", error.estimated_length,
+             error.true_length);
+  if (const auto ratio = error.length_ratio()) fmt::print(", ratio {:.6f}", *ratio);
+  fmt::print("\n");
+}
+
+AbsoluteError aligned_error(const std::vector<PosePair>& pairs, const Options& options) {
+  const Alignment alignment = options.align == "sim3"  ? Alignment::kSim3
+                              : options.align == "se3" ? Alignment::kSe3
+                                                       : Alignment::kNone;
+  const auto error = absolute_error(pairs, alignment);
+  if (!error) {
+    throw InputError(fmt::format("{}: {} pairs cannot be aligned by {}", options.estimate,
+                                 pairs.size(), options.align));
+  }
+  return *error;
+}
+
+void evaluate(const Options& options) {
+  const std::vector<PosePair> pairs = read_pairs(options);
+  nlohmann::ordered_json json = {
+      {"metric", options.metric}, {"align", options.align}, {"pairs", pairs.size()}};
+  if (options.metric == "ate") {
+    const AbsoluteError absolute = aligned_error(pairs, options);
+    json.update(to_json(absolute));
+    if (!options.json) {
+      print("position", absolute.position, 1, "m");
+      print_ratio(absolute);
+      if (options.align == "sim3") {
+        fmt::print("{:<12} {:.6f}\n", "scale", absolute.truth_from_estimate.scale());
+      }
+    }
+  } else {
+    const double scale =
+        options.align == "sim3" ? aligned_error(pairs, options).truth_from_estimate.scale() : 1;
+    const auto relative = relative_error(pairs, options.delta, scale);
+    if (!relative) {
+      throw InputError(fmt::format("{}: {} pairs are too few for --delta {}", options.estimate,
+                                   pairs.size(), options.delta));
+    }
+    json["delta"] = options.delta;
+    json.update(to_json(*relative));
+    if (!options.json) {
+      print("translation", relative->translation, 1, "m");
+      print("rotation", relative->rotation, 180 / std::numbers::pi, "deg");
+    }
+  }
+  if (options.json) fmt::print("{}\n", json.dump(2));
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  CLI::App app(kDescription);
+  app.footer(kFooter);
+  app.add_option("METRIC", options.metric, "ate or rpe")
+      ->required()
+      ->check(CLI::IsMember({"ate", "rpe"}));
+  app.add_option("EST", options.estimate, "estimated trajectory")->required();
+  app.add_option("TRUTH", options.truth, "true trajectory")->required();
+  app.add_option("--align", options.align, "se3, sim3 or none (rpe: sim3 applies its scale)")
+      ->check(CLI::IsMember({"se3", "sim3", "none"}))
+      ->capture_default_str();
+  app.add_option("--times", options.times, "times of KITTI poses, one per line [s]");
+  app.add_option("--max-difference", options.max_difference, "largest difference in time [s]")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--delta", options.delta, "rpe: number of pairs that a motion spans")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_flag("--json", options.json, "print JSON");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    fmt::print(stderr, "trajectory_eval: {} (--help tells more)\n", error.what());
+    return kBadUsage;
+  }
+  evaluate(options);
+  return kOk;
+}
+
+}  // namespace
+}  // namespace hybrid_slam
+
+int main(int argc, char** argv) {
+  try {
+    return hybrid_slam::run(argc, argv);
+  } catch (const hybrid_slam::InputError& error) {
+    std::fprintf(stderr, "trajectory_eval: %s\n", error.what());
+    return hybrid_slam::kBadInput;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "trajectory_eval: internal error: %s\n", error.what());
+    return hybrid_slam::kInternalError;
+  }
+}

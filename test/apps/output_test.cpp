@@ -1,0 +1,58 @@
+#include "apps/io/output_file.h"
+
+#include <cstring>
+
+#include <catch2/catch.hpp>
+
+#include "apps/io/ply.h"
+#include "test/support/temp_folder.h"
+
+namespace hybrid_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST_CASE("a file is replaced whole and nothing is left beside it") {
+  const TempFolder folder;
+  write_file(folder.path() / "a", "old");
+  write_file(folder.path() / "a", std::string(1 << 20, 'x'));
+  CHECK(read_text(folder.path() / "a") == std::string(1 << 20, 'x'));
+  CHECK(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()) == 1);
+}
+
+TEST_CASE("what cannot be written throws one line with the name, and leaves nothing behind") {
+  const TempFolder folder;
+  const auto refused = [](const fs::path& path) {
+    try {
+      write_file(path, "text");
+    } catch (const OutputError& error) {
+      const std::string line = error.what();
+      return line.find(path.string()) == 0 && line.find('\n') == std::string::npos;
+    }
+    return false;
+  };
+  CHECK(refused(folder.path() / "missing" / "a"));
+  fs::create_directory(folder.path() / "folder");
+  CHECK(refused(folder.path() / "folder"));
+  CHECK(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()) == 1);
+}
+
+TEST_CASE("a PLY file has a header and fifteen bytes per point") {
+  const TempFolder folder;
+  const std::vector<ColoredPoint> points{{{1, -2, 3.5}, {10, 20, 30}}, {{4, 5, 6}, {255, 0, 7}}};
+  write_ply(folder.path() / "a.ply", points);
+  const std::string text = read_text(folder.path() / "a.ply");
+  const std::size_t header = text.find("end_header\n") + 11;
+  CHECK(text.starts_with("ply\nformat binary_little_endian 1.0\nelement vertex 2\n"));
+  REQUIRE(text.size() == header + 30);
+  float xyz[3];
+  std::memcpy(xyz, text.data() + header, sizeof(xyz));
+  CHECK(xyz[0] == 1);
+  CHECK(xyz[1] == -2);
+  CHECK(xyz[2] == 3.5F);
+  CHECK(static_cast<unsigned char>(text[header + 14]) == 30);
+  CHECK(static_cast<unsigned char>(text[header + 15 + 12]) == 255);
+}
+
+}  // namespace
+}  // namespace hybrid_slam
