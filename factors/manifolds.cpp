@@ -1,20 +1,11 @@
 #include "factors/manifolds.h"
 
-#include <algorithm>
-
 #include "cameras/geometry/se3.h"
 #include "cameras/geometry/sim3d.h"
+#include "factors/transform_error.h"
 
 namespace hybrid_slam {
 namespace {
-
-// Reads a transform as it is, without normalising it.
-template <typename Transform>
-Transform from_memory(const double* params) {
-  Transform transform;
-  std::copy(params, params + transform.params.size(), transform.params.data());
-  return transform;
-}
 
 template <int kRows, int kCols>
 bool write_identity(double* jacobian) {
@@ -25,7 +16,7 @@ bool write_identity(double* jacobian) {
 }  // namespace
 
 bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-  const Rigid3d moved = se3_exp(Eigen::Map<const Vector6d>(delta)) * from_memory<Rigid3d>(x);
+  const Rigid3d moved = se3_exp(Eigen::Map<const Vector6d>(delta)) * from_block<Rigid3d>(x);
   Eigen::Map<Vector7d>{x_plus_delta} = moved.params;
   return true;
 }
@@ -36,7 +27,7 @@ bool PoseManifold::PlusJacobian(const double*, double* jacobian) const {
 
 bool PoseManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
   Eigen::Map<Vector6d>{y_minus_x} =
-      se3_log(from_memory<Rigid3d>(y) * inverse(from_memory<Rigid3d>(x)));
+      se3_log(from_block<Rigid3d>(y) * inverse(from_block<Rigid3d>(x)));
   return true;
 }
 
@@ -45,7 +36,7 @@ bool PoseManifold::MinusJacobian(const double*, double* jacobian) const {
 }
 
 bool Sim3Manifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-  const Sim3d moved = sim3_exp(Eigen::Map<const Vector7d>(delta)) * from_memory<Sim3d>(x);
+  const Sim3d moved = sim3_exp(Eigen::Map<const Vector7d>(delta)) * from_block<Sim3d>(x);
   Eigen::Map<Vector8d>{x_plus_delta} = moved.params;
   return true;
 }
@@ -55,8 +46,7 @@ bool Sim3Manifold::PlusJacobian(const double*, double* jacobian) const {
 }
 
 bool Sim3Manifold::Minus(const double* y, const double* x, double* y_minus_x) const {
-  Eigen::Map<Vector7d>{y_minus_x} =
-      sim3_log(from_memory<Sim3d>(y) * inverse(from_memory<Sim3d>(x)));
+  Eigen::Map<Vector7d>{y_minus_x} = sim3_log(from_block<Sim3d>(y) * inverse(from_block<Sim3d>(x)));
   return true;
 }
 
