@@ -10,12 +10,16 @@ namespace {
 
 // Cells small enough to spread, large enough that a cell's strongest are worth having.
 constexpr int kKeypointsPerCell = 8;
+constexpr double kStrongestShare = 0.75;
 
 struct Grid {
   double cell_size = 1;  // [px]
   int columns = 1;
   int rows = 1;
 
+  std::size_t cells() const {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
   std::size_t cell_of(const Keypoint& keypoint) const {
     const int column = std::clamp(static_cast<int>((keypoint.x + 0.5) / cell_size), 0, columns - 1);
     const int row = std::clamp(static_cast<int>((keypoint.y + 0.5) / cell_size), 0, rows - 1);
@@ -40,15 +44,18 @@ bool inside(const Keypoint& keypoint, int width, int height) {
 
 auto strength(const Keypoint& k) { return std::tuple(-k.response, k.y, k.x, k.scale, k.angle); }
 
-// The largest quota per cell with which no more than `max_count` are taken.
-int largest_quota(const std::vector<int>& counts, int max_count) {
+// The largest quota to which cells can be filled up, from what they have, with no more than
+// `max_count` in all.
+int largest_quota(const std::vector<int>& available, const std::vector<int>& taken, int max_count) {
   int low = 0;
   int high = max_count;
   while (low < high) {
     const int quota = low + (high - low + 1) / 2;
-    long taken = 0;
-    for (const int count : counts) taken += std::min(count, quota);
-    if (taken <= max_count) {
+    long total = 0;
+    for (std::size_t cell = 0; cell < taken.size(); ++cell) {
+      total += std::max(taken[cell], std::min(available[cell], quota));
+    }
+    if (total <= max_count) {
       low = quota;
     } else {
       high = quota - 1;
@@ -72,18 +79,24 @@ std::vector<int> select_spread(const std::vector<Keypoint>& keypoints, int width
   if (std::ssize(order) <= max_count) return order;
 
   const Grid grid = make_grid(width, height, max_count);
-  std::vector<int> counts(static_cast<std::size_t>(grid.columns) *
-                          static_cast<std::size_t>(grid.rows));
-  for (const int i : order) ++counts[grid.cell_of(at(i))];
-  const int quota = largest_quota(counts, max_count);
+  const auto strongest = static_cast<std::size_t>(max_count * kStrongestShare);
+  std::vector<int> available(grid.cells(), 0);
+  std::vector<int> taken(grid.cells(), 0);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::size_t cell = grid.cell_of(at(order[k]));
+    ++available[cell];
+    if (k < strongest) ++taken[cell];
+  }
+  const int quota = largest_quota(available, taken, max_count);
 
-  std::vector<int> taken(counts.size(), 0);
   std::vector<char> keep(order.size(), 0);
   int kept = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
-    int& in_cell = taken[grid.cell_of(at(order[k]))];
-    if (in_cell >= quota) continue;
-    ++in_cell;
+    if (k >= strongest) {
+      int& in_cell = taken[grid.cell_of(at(order[k]))];
+      if (in_cell >= quota) continue;
+      ++in_cell;
+    }
     ++kept;
     keep[k] = 1;
   }

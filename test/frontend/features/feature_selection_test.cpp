@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
 #include <random>
 #include <set>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
@@ -44,18 +47,29 @@ TEST_CASE("select_spread leaves out what lies outside the image") {
   CHECK(select_spread(keypoints, 20, 20, 4) == std::vector<int>{3});
 }
 
-TEST_CASE("select_spread gives every part of the image its share") {
+TEST_CASE("select_spread takes the strongest and leaves no part of the image empty") {
   const std::vector<Keypoint> keypoints = crowd();
   const std::vector<int> selected = select_spread(keypoints, 640, 480, 500);
   REQUIRE(selected.size() == 500);
   CHECK(std::set<int>(selected.begin(), selected.end()).size() == 500);
-  int right_half = 0;
-  for (const int i : selected) right_half += keypoints[static_cast<std::size_t>(i)].x >= 320;
-  CHECK(right_half > 220);  // none, were the strongest taken; 250, were all places alike
-  CHECK(right_half < 280);
+  std::vector<int> order(4000);
+  std::iota(order.begin(), order.end(), 0);
+  const auto response = [&](int i) { return keypoints[static_cast<std::size_t>(i)].response; };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return response(a) > response(b); });
+  // The 375 strongest, all in the crowd, then about 14 for each of nine blocks beside it.
+  CHECK(std::equal(selected.begin(), selected.begin() + 375, order.begin(),
+                   [&](int a, int b) { return response(a) == response(b); }));
+  std::map<std::pair<int, int>, int> blocks;
+  for (const int i : selected) {
+    const Keypoint& k = keypoints[static_cast<std::size_t>(i)];
+    if (k.x >= 80) ++blocks[{static_cast<int>((k.x - 80) / 187), static_cast<int>(k.y / 160)}];
+  }
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) CHECK(blocks[std::pair(column, row)] >= 8);
+  }
 }
 
-TEST_CASE("select_spread takes the strongest of each place") {
+TEST_CASE("select_spread takes the strongest of one place") {
   // One cell: the order of strength alone.
   std::vector<Keypoint> keypoints;
   for (int i = 0; i < 100; ++i) keypoints.push_back(keypoint(i % 10, i / 10, (i * 37) % 100));
