@@ -67,7 +67,7 @@ MotionErrors run(const ImageSequence& sequence, std::size_t first, std::size_t l
 // None, and a line that says so, where the shared data are not at hand.
 std::unique_ptr<ImageSequence> open(const char* path, const char* name) {
   const char* data = std::getenv("HYBRID_SLAM_DATA");
-  if (data == nullptr) {
+  if (data == nullptr || *data == '\0') {
     std::cout << "SKIPPED: HYBRID_SLAM_DATA is not set\n";
     return nullptr;
   }
