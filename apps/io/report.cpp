@@ -24,22 +24,6 @@ double percentile(const std::vector<double>& sorted, double percent) {
 
 }  // namespace
 
-void StageTimes::add(std::string_view stage, double milliseconds) {
-  const auto same = [&](const auto& entry) { return entry.first == stage; };
-  auto entry = std::find_if(stages_.begin(), stages_.end(), same);
-  if (entry == stages_.end()) {
-    stages_.emplace_back(stage, std::vector<double>());
-    entry = stages_.end() - 1;
-  }
-  entry->second.push_back(milliseconds);
-}
-
-void StageTimes::merge(const StageTimes& other) {
-  for (const auto& [stage, durations] : other.stages()) {
-    for (const double duration : durations) add(stage, duration);
-  }
-}
-
 Json to_json(const StageTimes& times) {
   Json json = Json::object();
   for (const auto& [stage, durations] : times.stages()) {

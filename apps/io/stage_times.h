@@ -1,31 +1,42 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
-#include <map>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace hybrid_slam {
 
-// Durations [ms] of the stages of a run, sample by sample. Not thread-safe: one per thread, merged
-// at the end.
+// How long each run of each stage took. One owner; the workers' are merged at the end.
 class StageTimes {
  public:
-  void add(const std::string& stage, double milliseconds) {
-    samples_[stage].push_back(milliseconds);
+  void add(std::string_view stage, double milliseconds) {
+    durations(stage).push_back(milliseconds);
   }
 
   void merge(const StageTimes& other) {
-    for (const auto& [stage, samples] : other.samples_) {
-      auto& mine = samples_[stage];
-      mine.insert(mine.end(), samples.begin(), samples.end());
+    for (const auto& [stage, theirs] : other.stages_) {
+      auto& mine = durations(stage);
+      mine.insert(mine.end(), theirs.begin(), theirs.end());
     }
   }
 
-  const std::map<std::string, std::vector<double>>& samples() const { return samples_; }
+  // Stages in the order in which they were first added, with every duration [ms].
+  const std::vector<std::pair<std::string, std::vector<double>>>& stages() const { return stages_; }
 
  private:
-  std::map<std::string, std::vector<double>> samples_;
+  std::vector<double>& durations(std::string_view stage) {
+    const auto same = [&](const auto& entry) { return entry.first == stage; };
+    const auto entry = std::find_if(stages_.begin(), stages_.end(), same);
+    if (entry != stages_.end()) {
+      return entry->second;
+    }
+    return stages_.emplace_back(stage, std::vector<double>()).second;
+  }
+
+  std::vector<std::pair<std::string, std::vector<double>>> stages_;
 };
 
 // Times consecutive stages of one piece of work.
@@ -34,7 +45,7 @@ class StageClock {
   explicit StageClock(StageTimes& times) : times_(times) {}
 
   // The time since the last lap, or since construction, belongs to `stage`.
-  void lap(const std::string& stage) {
+  void lap(std::string_view stage) {
     const auto now = std::chrono::steady_clock::now();
     times_.add(stage, std::chrono::duration<double, std::milli>(now - start_).count());
     start_ = now;

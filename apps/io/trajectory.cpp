@@ -23,8 +23,8 @@ std::size_t nearest(std::span<const StampedPose> poses, double time) {
 
 // Eigen's Umeyama, since it also serves a straight path: its rotation about itself is free, but the
 // error is not.
-std::optional<Sim3d> align(std::span<const PosePair> pairs, Alignment alignment) {
-  if (alignment == Alignment::kNone) return Sim3d();
+std::optional<Sim3d> align(std::span<const PosePair> pairs, TrajectoryAlignment alignment) {
+  if (alignment == TrajectoryAlignment::kNone) return Sim3d();
   if (pairs.size() < kMinPairsToAlign) return std::nullopt;
   Eigen::Matrix3Xd estimate(3, static_cast<Eigen::Index>(pairs.size()));
   Eigen::Matrix3Xd truth(3, estimate.cols());
@@ -32,7 +32,7 @@ std::optional<Sim3d> align(std::span<const PosePair> pairs, Alignment alignment)
     estimate.col(i) = pairs[static_cast<std::size_t>(i)].estimate.translation();
     truth.col(i) = pairs[static_cast<std::size_t>(i)].truth.translation();
   }
-  const bool with_scale = alignment == Alignment::kSim3;
+  const bool with_scale = alignment == TrajectoryAlignment::kSim3;
   if (with_scale && (estimate.colwise() - estimate.col(0)).isZero(0)) return std::nullopt;
   const Eigen::Matrix4d transform = Eigen::umeyama(estimate, truth, with_scale);
   const Eigen::Matrix3d scaled_rotation = transform.topLeftCorner<3, 3>();
@@ -87,7 +87,8 @@ std::optional<double> AbsoluteError::length_ratio() const {
   return estimated_length / true_length;
 }
 
-std::optional<AbsoluteError> absolute_error(std::span<const PosePair> pairs, Alignment alignment) {
+std::optional<AbsoluteError> absolute_error(std::span<const PosePair> pairs,
+                                            TrajectoryAlignment alignment) {
   if (pairs.empty()) return std::nullopt;
   const std::optional<Sim3d> truth_from_estimate = align(pairs, alignment);
   if (!truth_from_estimate) return std::nullopt;

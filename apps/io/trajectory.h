@@ -39,7 +39,7 @@ struct PosePair {
 std::vector<PosePair> associate(std::span<const StampedPose> estimate,
                                 std::span<const StampedPose> truth, double max_difference);
 
-enum class Alignment { kNone, kSe3, kSim3 };
+enum class TrajectoryAlignment { kNone, kSe3, kSim3 };
 
 struct ErrorStatistics {
   std::size_t count = 0;
@@ -63,7 +63,8 @@ struct AbsoluteError {
 
 // None if there are too few pairs to align (none at all; fewer than three for se3 and sim3), or
 // for sim3 if the estimate stands still.
-std::optional<AbsoluteError> absolute_error(std::span<const PosePair> pairs, Alignment alignment);
+std::optional<AbsoluteError> absolute_error(std::span<const PosePair> pairs,
+                                            TrajectoryAlignment alignment);
 
 // Relative pose error: the motions over `delta` pairs, each seen from its first camera, compared
 // between estimate and truth. `estimate_scale` multiplies the estimate's translations.

@@ -87,9 +87,9 @@ void print_ratio(const AbsoluteError& error) {
 }
 
 AbsoluteError aligned_error(const std::vector<PosePair>& pairs, const Options& options) {
-  const Alignment alignment = options.align == "sim3"  ? Alignment::kSim3
-                              : options.align == "se3" ? Alignment::kSe3
-                                                       : Alignment::kNone;
+  const TrajectoryAlignment alignment = options.align == "sim3"  ? TrajectoryAlignment::kSim3
+                                        : options.align == "se3" ? TrajectoryAlignment::kSe3
+                                                                 : TrajectoryAlignment::kNone;
   const auto error = absolute_error(pairs, alignment);
   if (!error) {
     throw InputError(fmt::format("{}: {} pairs cannot be aligned by {}", options.estimate,

@@ -42,7 +42,7 @@ TEST_CASE("a trajectory moved by a known similarity has no error once aligned") 
   const auto pairs = associate(estimate, truth, 0.01);
   REQUIRE(pairs.size() == 200);
 
-  const auto sim3 = absolute_error(pairs, Alignment::kSim3);
+  const auto sim3 = absolute_error(pairs, TrajectoryAlignment::kSim3);
   REQUIRE(sim3);
   CHECK(sim3->position.max < 1e-9);
   CHECK(sim3->truth_from_estimate.scale() == Approx(2.5).epsilon(1e-12));
@@ -52,7 +52,7 @@ TEST_CASE("a trajectory moved by a known similarity has no error once aligned") 
             Eigen::Quaterniond(truth_from_estimate.rotation())) < 1e-9);
   REQUIRE(sim3->length_ratio());
   CHECK(*sim3->length_ratio() == Approx(1 / 2.5));
-  CHECK(absolute_error(pairs, Alignment::kSe3)->position.rmse > 1);
+  CHECK(absolute_error(pairs, TrajectoryAlignment::kSe3)->position.rmse > 1);
 
   const auto rpe = relative_error(pairs, 1, 2.5);
   REQUIRE(rpe);
@@ -65,8 +65,8 @@ TEST_CASE("SE3 alignment removes a rigid motion, no alignment leaves it") {
   Sim3d shift;
   shift = Sim3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 3, 4), 1);
   const auto pairs = associate(transformed(truth, shift), truth, 0.01);
-  CHECK(absolute_error(pairs, Alignment::kSe3)->position.max < 1e-9);
-  const auto none = absolute_error(pairs, Alignment::kNone);
+  CHECK(absolute_error(pairs, TrajectoryAlignment::kSe3)->position.max < 1e-9);
+  const auto none = absolute_error(pairs, TrajectoryAlignment::kNone);
   CHECK(none->position.rmse == Approx(5));
   CHECK(none->position.median == Approx(5));
 }
@@ -79,7 +79,7 @@ TEST_CASE("noise of known size gives the error it must") {
   for (StampedPose& pose : estimate) {
     for (int i = 0; i < 3; ++i) pose.world_from_cam.translation()[i] += noise(random);
   }
-  const auto error = absolute_error(associate(estimate, truth, 0.01), Alignment::kSe3);
+  const auto error = absolute_error(associate(estimate, truth, 0.01), TrajectoryAlignment::kSe3);
   CHECK(error->position.rmse == Approx(0.02 * std::sqrt(3)).epsilon(0.03));
   CHECK(error->position.mean == Approx(0.02 * std::sqrt(8 / M_PI)).epsilon(0.03));
 }
@@ -122,17 +122,17 @@ TEST_CASE("a straight path and a standing one can be evaluated") {
     truth.push_back({0.1 * i, Rigid3d(Eigen::Quaterniond::Identity(), {0, 0, 0.5 * i})});
   }
   const auto straight = absolute_error(
-      associate(transformed(truth, some_similarity(2)), truth, 0.01), Alignment::kSim3);
+      associate(transformed(truth, some_similarity(2)), truth, 0.01), TrajectoryAlignment::kSim3);
   REQUIRE(straight);
   CHECK(straight->position.max < 1e-9);
   for (StampedPose& pose : truth) pose.world_from_cam.translation().setZero();
   const auto still = associate(truth, truth, 0.01);
-  CHECK_FALSE(absolute_error(still, Alignment::kSim3));
-  REQUIRE(absolute_error(still, Alignment::kSe3));
-  CHECK_FALSE(absolute_error(still, Alignment::kSe3)->length_ratio());
-  CHECK_FALSE(absolute_error(std::vector<PosePair>(), Alignment::kNone));
-  CHECK_FALSE(
-      absolute_error(std::vector<PosePair>(still.begin(), still.begin() + 2), Alignment::kSe3));
+  CHECK_FALSE(absolute_error(still, TrajectoryAlignment::kSim3));
+  REQUIRE(absolute_error(still, TrajectoryAlignment::kSe3));
+  CHECK_FALSE(absolute_error(still, TrajectoryAlignment::kSe3)->length_ratio());
+  CHECK_FALSE(absolute_error(std::vector<PosePair>(), TrajectoryAlignment::kNone));
+  CHECK_FALSE(absolute_error(std::vector<PosePair>(still.begin(), still.begin() + 2),
+                             TrajectoryAlignment::kSe3));
 }
 
 TEST_CASE("poses are paired with the nearest in time, each truth once") {
@@ -184,7 +184,7 @@ TEST_CASE("KITTI and TUM files of one trajectory give the same errors") {
     const TrajectoryFile true_file = read_trajectory(folder.path() / t);
     const auto pairs = associate(estimated.poses, true_file.poses, 0.01);
     REQUIRE(pairs.size() == 60);
-    return std::pair(absolute_error(pairs, Alignment::kSe3)->position.rmse,
+    return std::pair(absolute_error(pairs, TrajectoryAlignment::kSe3)->position.rmse,
                      relative_error(pairs, 1, 1)->translation.rmse);
   };
   const auto [tum_ate, tum_rpe] = error("e.tum", "t.tum");
