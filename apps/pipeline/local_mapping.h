@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stop_token>
+
+#include "apps/io/stage_times.h"
+#include "apps/pipeline/slam_options.h"
+#include "backend/backend.h"
+#include "frontend/mapping/culling.h"
+
+namespace hybrid_slam {
+
+// A frame that shall become a keyframe, and what tracking counted since the last one.
+struct MappingJob {
+  NewKeyframe keyframe;
+  MapEdit counts;
+};
+
+// Adds the counts of one frame to those that wait for the next keyframe.
+void append_counts(const MapEdit& counts, MapEdit& waiting);
+
+// What happens for each new keyframe, step by step: the frontend decides, the backend applies and
+// optimises. Owns the map. Synchronous; one thread at a time.
+class LocalMapping {
+ public:
+  explicit LocalMapping(const SlamOptions& options);
+
+  CameraId add_camera(const Camera& camera) { return backend_.add_camera(camera); }
+
+  // `publish` is called whenever the map is worth looking at: once it holds the keyframe, and at
+  // the end. `stop` cuts the bundle adjustment short.
+  KeyframeId process(const MappingJob& job, StageTimes& times, std::stop_token stop,
+                     const std::function<void()>& publish);
+
+  std::shared_ptr<const MapSnapshot> snapshot() { return backend_.snapshot(); }
+  const Map& map() const { return backend_.map(); }
+
+ private:
+  SlamOptions options_;
+  Backend backend_;
+  LandmarkProbation probation_;
+};
+
+}  // namespace hybrid_slam

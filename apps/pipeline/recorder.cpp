@@ -1,0 +1,56 @@
+#include "apps/pipeline/recorder.h"
+
+namespace hybrid_slam {
+
+Rigid3d RunResult::cam_from_world(const FrameRecord& record) const {
+  if (record.keyframe) {
+    return map->cam_from_world(*record.keyframe);
+  }
+  return record.frame.cam_from_reference * map->cam_from_world(record.frame.reference);
+}
+
+void Recorder::corrupt(const std::string& reason) {
+  ++result_.frames.read;
+  ++result_.frames.corrupt;
+  if (hooks_.warning) {
+    hooks_.warning(reason);
+  }
+  report(nullptr);
+}
+
+void Recorder::tracked(const TrackedFrame& frame, const MapSnapshot& map) {
+  ++result_.frames.read;
+  ++(frame.tracked() ? result_.frames.tracked : result_.frames.lost);
+  record_of_frame_[frame.frame_index] = result_.records.size();
+  FrameRecord record{frame, std::nullopt};
+  record.frame.keyframe.reset();
+  record.frame.counts = {};
+  result_.records.push_back(std::move(record));
+  report(&map);
+}
+
+void Recorder::became_keyframe(std::int64_t frame_index, KeyframeId id) {
+  result_.records[record_of_frame_.at(frame_index)].keyframe = id;
+}
+
+bool Recorder::cancelled() {
+  result_.cancelled = result_.cancelled || (hooks_.cancelled != nullptr && *hooks_.cancelled);
+  return result_.cancelled;
+}
+
+void Recorder::report(const MapSnapshot* map) {
+  if (!hooks_.progress) {
+    return;
+  }
+  RunProgress progress;
+  progress.frames = result_.frames;
+  progress.done = static_cast<std::size_t>(result_.frames.read + result_.frames.dropped);
+  progress.total = total_;
+  if (map != nullptr) {
+    progress.keyframes = map->keyframe_count();
+    progress.landmarks = map->landmark_count();
+  }
+  hooks_.progress(progress);
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+#include "apps/pipeline/slam_run.h"
+
+namespace hybrid_slam {
+
+// Keeps the books of a run: counts, records, progress. One thread.
+class Recorder {
+ public:
+  Recorder(RunResult& result, const RunHooks& hooks, std::size_t total)
+      : result_(result), hooks_(hooks), total_(total) {}
+
+  void corrupt(const std::string& reason);
+  void dropped(int count) { result_.frames.dropped += count; }
+  void tracked(const TrackedFrame& frame, const MapSnapshot& map);
+  void became_keyframe(std::int64_t frame_index, KeyframeId id);
+  bool cancelled();
+
+ private:
+  void report(const MapSnapshot* map);
+
+  RunResult& result_;
+  const RunHooks& hooks_;
+  std::size_t total_;
+  std::map<std::int64_t, std::size_t> record_of_frame_;
+};
+
+}  // namespace hybrid_slam

@@ -1,0 +1,220 @@
+#include "apps/pipeline/slam_options.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <functional>
+#include <map>
+
+#include "cameras/input_error.h"
+
+namespace hybrid_slam {
+namespace {
+
+// One mapping of the file: every key that fields() names may appear in it, and no other.
+class Section {
+ public:
+  Section(const std::string& path, const std::string& name, const YAML::Node& node)
+      : path_(path), name_(name), node_(node) {
+    if (node && !node.IsNull() && !node.IsMap()) {
+      fail(node, name_ + " must hold keys and values");
+    }
+  }
+
+  template <typename T>
+  Section& field(const char* key, T& value) {
+    known_[key] = true;
+    if (node_ && node_.IsMap() && node_[key]) {
+      try {
+        value = node_[key].as<T>();
+      } catch (const YAML::Exception&) {
+        fail(node_[key], name_ + key + " has a value of the wrong type");
+      }
+    }
+    return *this;
+  }
+
+  Section section(const char* key) {
+    known_[key] = true;
+    return {path_, name_ + key + ".", node_ && node_.IsMap() ? node_[key] : YAML::Node()};
+  }
+
+  void refuse_unknown() const {
+    if (!node_ || !node_.IsMap()) {
+      return;
+    }
+    for (const auto& entry : node_) {
+      const auto key = entry.first.as<std::string>();
+      if (!known_.contains(key)) {
+        fail(entry.first, "unknown key " + name_ + key);
+      }
+    }
+  }
+
+ private:
+  [[noreturn]] void fail(const YAML::Node& at, const std::string& reason) const {
+    throw InputError(path_ + ":" + std::to_string(at.Mark().line + 1) + ": " + reason);
+  }
+
+  std::string path_;
+  std::string name_;
+  YAML::Node node_;
+  std::map<std::string, bool> known_;
+};
+
+void read_sift(Section section, SiftOptions& options) {
+  section.field("octave_layers", options.octave_layers)
+      .field("contrast_threshold", options.contrast_threshold)
+      .field("edge_threshold", options.edge_threshold)
+      .field("initial_sigma", options.initial_sigma)
+      .field("upsample", options.upsample)
+      .field("keypoint_sigma", options.keypoint_sigma)
+      .refuse_unknown();
+}
+
+void read_stereo(Section section, StereoMatcherOptions& options) {
+  section.field("max_row_difference", options.max_row_difference)
+      .field("min_disparity", options.min_disparity)
+      .field("max_descriptor_distance", options.max_descriptor_distance)
+      .field("ratio", options.ratio)
+      .field("refine", options.refine)
+      .refuse_unknown();
+}
+
+void read_keyframes(Section section, KeyframePolicyOptions& options) {
+  section.field("min_tracked_ratio", options.min_tracked_ratio)
+      .field("min_tracked_ratio_young", options.min_tracked_ratio_young)
+      .field("min_inliers", options.min_inliers)
+      .field("min_close_tracked", options.min_close_tracked)
+      .field("min_close_untracked", options.min_close_untracked)
+      .field("max_frames_between", options.max_frames_between)
+      .field("min_motion", options.min_motion)
+      .refuse_unknown();
+}
+
+void read_odometer(Section section, StereoOdometerOptions& options) {
+  section.field("ransac_iterations", options.ransac_iterations)
+      .field("inlier_threshold", options.inlier_threshold)
+      .field("min_inliers", options.min_inliers)
+      .field("max_gauss_newton_iterations", options.max_gauss_newton_iterations)
+      .refuse_unknown();
+}
+
+void read_refinement(Section section, TrackRefinementOptions& options) {
+  section.field("enabled", options.enabled)
+      .field("keyframes", options.keyframes)
+      .field("sigma", options.sigma)
+      .field("max_view_angle_deg", options.max_view_angle_deg)
+      .refuse_unknown();
+}
+
+void read_tracking(Section section, StereoTrackerOptions& options) {
+  read_odometer(section.section("odometer"), options.odometer);
+  read_keyframes(section.section("keyframes"), options.keyframes);
+  read_refinement(section.section("refinement"), options.refinement);
+  section.section("matcher")
+      .field("max_descriptor_distance", options.matcher.max_descriptor_distance)
+      .field("ratio", options.matcher.ratio)
+      .field("max_scale_ratio", options.matcher.max_scale_ratio)
+      .field("max_view_angle_deg", options.matcher.max_view_angle_deg)
+      .refuse_unknown();
+  section.section("relocalization")
+      .field("max_keyframes", options.relocalization.max_keyframes)
+      .field("ratio", options.relocalization.ratio)
+      .field("min_matches", options.relocalization.min_matches)
+      .field("min_inliers", options.relocalization.min_inliers)
+      .refuse_unknown();
+  section.field("min_initial_share", options.min_initial_share)
+      .field("close_baselines", options.close_baselines)
+      .field("min_new_points", options.min_new_points)
+      .field("last_frame_radius", options.last_frame_radius)
+      .field("last_frame_retry_share", options.last_frame_retry_share)
+      .field("last_frame_min_share", options.last_frame_min_share)
+      .field("min_reference_matches", options.min_reference_matches)
+      .field("min_pose_inliers", options.min_pose_inliers)
+      .field("local_map_radius", options.local_map_radius)
+      .field("min_local_map_inliers", options.min_local_map_inliers)
+      .field("min_odometer_inliers", options.min_odometer_inliers)
+      .refuse_unknown();
+}
+
+void read_triangulation(Section section, TriangulationOptions& options) {
+  section.field("stereo_neighbours", options.stereo_neighbours)
+      .field("mono_neighbours", options.mono_neighbours)
+      .field("min_baseline_ratio", options.min_baseline_ratio)
+      .field("max_parallax_cosine", options.max_parallax_cosine)
+      .field("max_descriptor_distance", options.max_descriptor_distance)
+      .field("ratio", options.ratio)
+      .field("epipolar_sigmas", options.epipolar_sigmas)
+      .field("max_scale_ratio", options.max_scale_ratio)
+      .refuse_unknown();
+}
+
+void read_fusion(Section section, FusionOptions& options) {
+  section.field("neighbours", options.neighbours)
+      .field("second_neighbours", options.second_neighbours)
+      .field("radius", options.radius)
+      .field("max_descriptor_distance", options.max_descriptor_distance)
+      .field("max_scale_ratio", options.max_scale_ratio)
+      .refuse_unknown();
+}
+
+void read_culling(Section section, CullingOptions& options) {
+  section.field("min_found_ratio", options.min_found_ratio)
+      .field("min_observations", options.min_observations)
+      .field("probation", options.probation)
+      .field("redundant_share", options.redundant_share)
+      .field("redundant_observers", options.redundant_observers)
+      .field("close_baselines", options.close_baselines)
+      .refuse_unknown();
+}
+
+}  // namespace
+
+void SlamOptions::distribute() {
+  sift.max_features = features;
+  tracking.max_features = features;
+  tracking.odometer.seed = seed;
+  tracking.relocalization.ransac.seed = seed;
+}
+
+std::string SlamOptions::validate() const {
+  if (features < 50 || features > 100000) {
+    return "features must lie between 50 and 100000";
+  }
+  for (const std::string& error :
+       {sift.validate(), stereo.validate(), tracking.validate(), triangulation.validate(),
+        fusion.validate(), culling.validate()}) {
+    if (!error.empty()) {
+      return error;
+    }
+  }
+  return {};
+}
+
+SlamOptions read_slam_options(const std::string& path) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(path);
+  } catch (const YAML::BadFile&) {
+    throw InputError(path + ": cannot be read");
+  } catch (const YAML::Exception& error) {
+    throw InputError(path + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
+  }
+  SlamOptions options;
+  Section top(path, "", root);
+  read_sift(top.section("sift"), options.sift);
+  read_stereo(top.section("stereo"), options.stereo);
+  read_tracking(top.section("tracking"), options.tracking);
+  read_triangulation(top.section("triangulation"), options.triangulation);
+  read_fusion(top.section("fusion"), options.fusion);
+  read_culling(top.section("culling"), options.culling);
+  top.field("features", options.features).field("seed", options.seed).refuse_unknown();
+  options.distribute();
+  const std::string error = options.validate();
+  if (!error.empty()) {
+    throw InputError(path + ": " + error);
+  }
+  return options;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "backend/backend.h"
+#include "frontend/features/sift.h"
+#include "frontend/mapping/culling.h"
+#include "frontend/mapping/fusion.h"
+#include "frontend/mapping/triangulation.h"
+#include "frontend/matching/stereo_matcher.h"
+#include "frontend/tracking/stereo_tracker.h"
+
+namespace hybrid_slam {
+
+// Everything that can be set, in one value. Read from YAML at the border only.
+struct SlamOptions {
+  int features = 2000;  // N: per image; also the measure of the tracker's shares
+  std::uint64_t seed = 0;
+  SiftOptions sift;
+  StereoMatcherOptions stereo;
+  StereoTrackerOptions tracking;
+  TriangulationOptions triangulation;
+  FusionOptions fusion;
+  CullingOptions culling;
+  BackendOptions backend;
+
+  // Hands `features` and `seed` down to the parts that use them.
+  void distribute();
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
+};
+
+// Reads options over the defaults. Throws InputError with file, line and key: not readable, an
+// unknown key, a value of the wrong type, or one out of range.
+SlamOptions read_slam_options(const std::string& path);
+
+}  // namespace hybrid_slam

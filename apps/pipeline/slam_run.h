@@ -1,0 +1,78 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "apps/io/stage_times.h"
+#include "apps/pipeline/frame_source.h"
+#include "apps/pipeline/slam_options.h"
+#include "frontend/tracking/stereo_tracker.h"
+
+namespace hybrid_slam {
+
+struct RunOptions {
+  int threads = 1;        // that read images and extract features; no result depends on it
+  std::size_t limit = 0;  // frames to process at most; 0: all
+  double rate =
+      0;  // realtime: images per second, dropped when the pipeline is behind; 0: they wait
+};
+
+struct FrameCounts {
+  int read = 0;  // handed to the pipeline, corrupt ones included
+  int tracked = 0;
+  int lost = 0;  // the map not yet begun included
+  int dropped = 0;
+  int corrupt = 0;
+};
+
+// What stays of a tracked frame.
+struct FrameRecord {
+  TrackedFrame frame;                  // without its keyframe and counts
+  std::optional<KeyframeId> keyframe;  // the keyframe it became
+};
+
+struct RunProgress {
+  std::size_t done = 0;
+  std::size_t total = 0;
+  FrameCounts frames;
+  std::size_t keyframes = 0;
+  std::size_t landmarks = 0;
+};
+
+// What a run needs from outside. `cancelled` may be set at any moment, from a signal handler too:
+// the run then ends in order, with what it has.
+struct RunHooks {
+  std::function<void(const RunProgress&)> progress;  // after each frame, in the calling thread
+  std::function<void(const std::string&)> warning;   // one line each
+  const std::atomic<bool>* cancelled = nullptr;
+};
+
+struct RunResult {
+  FrameCounts frames;
+  std::vector<FrameRecord> records;  // every frame that was read, in order
+  std::shared_ptr<const MapSnapshot> map;
+  StageTimes times;
+  bool cancelled = false;
+
+  // Final pose of a tracked frame, through its reference keyframe.
+  Rigid3d cam_from_world(const FrameRecord& record) const;
+};
+
+// One per core.
+int default_thread_count();
+
+// Every frame is tracked and mapped before the next one. Same input, options and seed give the same
+// result, bit for bit.
+RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
+                          const RunOptions& run, const RunHooks& hooks);
+
+// Reading, tracking and local mapping in their own threads, joined at the end.
+RunResult run_realtime(const FrameSource& source, const SlamOptions& options, const RunOptions& run,
+                       const RunHooks& hooks);
+
+}  // namespace hybrid_slam

@@ -1,0 +1,170 @@
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+
+#include "apps/pipeline/slam_run.h"
+#include "test/integration/simulated_source.h"
+
+namespace hybrid_slam {
+namespace {
+
+SyntheticSceneOptions orbit(int times) {
+  SyntheticSceneOptions options;
+  options.trajectory = SceneTrajectory::kOrbit;
+  options.times = times;
+  options.landmarks = 4000;
+  options.clutter = 100;
+  return options;
+}
+
+SlamOptions slam_options() {
+  SlamOptions options;
+  options.features = 1000;
+  options.distribute();
+  return options;
+}
+
+// Root mean square distance between the estimated and the true camera centres; both worlds are the
+// first camera's.
+double position_error(const RunResult& result, const SyntheticScene& scene) {
+  double sum = 0;
+  int count = 0;
+  for (const FrameRecord& record : result.records) {
+    if (record.frame.tracked()) {
+      const auto& truth = scene.frames[static_cast<std::size_t>(record.frame.frame_index)];
+      sum += (origin_in_a(result.cam_from_world(record)) - origin_in_a(truth.cam_from_world))
+                 .squaredNorm();
+      ++count;
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+std::vector<double> poses(const RunResult& result) {
+  std::vector<double> values;
+  for (const FrameRecord& record : result.records) {
+    const Rigid3d pose = result.cam_from_world(record);
+    values.insert(values.end(), pose.params.begin(), pose.params.end());
+  }
+  return values;
+}
+
+}  // namespace
+
+TEST_CASE("A simulated orbit is tracked to the truth", "[integration]") {
+  const SimulatedSource source(make_synthetic_scene(orbit(60)));
+  const RunResult result = run_every_frame(source, slam_options(), {}, {});
+  CHECK(result.frames.read == 60);
+  CHECK(result.frames.tracked == 60);
+  CHECK(result.map->keyframe_count() > 5);
+  CHECK(position_error(result, source.scene()) < 0.01);
+  for (const FrameRecord& record : result.records) {
+    CHECK(record.frame.source != PoseSource::kOdometer);
+  }
+}
+
+TEST_CASE("Wrong matches do not bend a simulated corridor", "[integration]") {
+  SyntheticSceneOptions scene;
+  scene.trajectory = SceneTrajectory::kCorridor;
+  scene.times = 60;
+  scene.outlier_rate = 0.1;
+  const SimulatedSource source(make_synthetic_scene(scene));
+  const RunResult result = run_every_frame(source, slam_options(), {}, {});
+  CHECK(result.frames.tracked == 60);
+  CHECK(position_error(result, source.scene()) < 0.003 * 60 * 0.4);  // of the path's length
+}
+
+TEST_CASE("every-frame mode gives the same bits whatever the number of threads", "[integration]") {
+  const SimulatedSource source(make_synthetic_scene(orbit(30)));
+  RunOptions run;
+  const auto once = poses(run_every_frame(source, slam_options(), run, {}));
+  run.threads = 3;
+  const auto again = poses(run_every_frame(source, slam_options(), run, {}));
+  REQUIRE(once.size() == again.size());
+  CHECK(std::memcmp(once.data(), again.data(), once.size() * sizeof(double)) == 0);
+}
+
+TEST_CASE("Keyframes stay bounded while the vehicle hovers over mapped ground", "[integration]") {
+  SyntheticSceneOptions scene;
+  scene.trajectory = SceneTrajectory::kHover;
+  scene.times = 200;
+  const SimulatedSource source(make_synthetic_scene(scene));
+  const RunResult result = run_every_frame(source, slam_options(), {}, {});
+  CHECK(result.frames.tracked == 200);
+  CHECK(result.map->keyframe_count() < 20);
+  CHECK(position_error(result, source.scene()) < 0.01);
+}
+
+TEST_CASE("Unreadable frames are counted and tracking goes on", "[integration]") {
+  SimulatedSource source(make_synthetic_scene(orbit(60)));
+  source.corrupt = {0, 10, 11, 59};
+  std::vector<std::string> warnings;
+  RunHooks hooks;
+  hooks.warning = [&](const std::string& line) { warnings.push_back(line); };
+  const RunResult result = run_every_frame(source, slam_options(), {}, hooks);
+  CHECK(result.frames.read == 60);
+  CHECK(result.frames.corrupt == 4);
+  CHECK(result.frames.tracked == 56);
+  CHECK(warnings.size() == 4);
+}
+
+TEST_CASE("After blank frames the camera is found again in the map", "[integration]") {
+  SimulatedSource source(make_synthetic_scene(orbit(60)));
+  source.blank = {20, 21, 22, 23};
+  const RunResult result = run_every_frame(source, slam_options(), {}, {});
+  CHECK(result.frames.lost >= 4);
+  CHECK(result.frames.lost <= 12);
+  CHECK(result.records.back().frame.tracked());
+  CHECK(position_error(result, source.scene()) < 0.02);
+}
+
+TEST_CASE("A source without features never starts a map, and says so", "[integration]") {
+  SimulatedSource source(make_synthetic_scene(orbit(5)));
+  source.blank = {0, 1, 2, 3, 4};
+  const RunResult result = run_every_frame(source, slam_options(), {}, {});
+  CHECK(result.frames.lost == 5);
+  CHECK(result.frames.tracked == 0);
+  CHECK(result.map->keyframe_count() == 0);
+}
+
+TEST_CASE("realtime mode tracks the same scene and joins its threads", "[integration]") {
+  const SimulatedSource source(make_synthetic_scene(orbit(60)));
+  RunOptions run;
+  run.threads = 2;
+  const RunResult result = run_realtime(source, slam_options(), run, {});
+  CHECK(result.frames.read == 60);
+  CHECK(result.frames.tracked >= 58);
+  CHECK(position_error(result, source.scene()) < 0.02);
+}
+
+TEST_CASE("With a rate, images that come too early are dropped and counted", "[integration]") {
+  const SimulatedSource source(make_synthetic_scene(orbit(60)));
+  RunOptions run;
+  run.rate = 1e5;
+  const RunResult result = run_realtime(source, slam_options(), run, {});
+  CHECK(result.frames.dropped > 0);
+  CHECK(result.frames.read + result.frames.dropped == 60);
+  CHECK(result.frames.tracked + result.frames.lost == result.frames.read);
+}
+
+TEST_CASE("A run can be cancelled at any frame and keeps what it has", "[integration]") {
+  const SimulatedSource source(make_synthetic_scene(orbit(40)));
+  for (const bool realtime : {false, true}) {
+    for (const int after : {1, 7, 23}) {
+      std::atomic<bool> cancelled = false;
+      RunHooks hooks;
+      hooks.cancelled = &cancelled;
+      hooks.progress = [&](const RunProgress& progress) {
+        cancelled = static_cast<int>(progress.done) >= after;
+      };
+      const RunResult result = realtime ? run_realtime(source, slam_options(), {}, hooks)
+                                        : run_every_frame(source, slam_options(), {}, hooks);
+      CHECK(result.cancelled);
+      CHECK(result.frames.read == after);
+      CHECK(result.frames.tracked == after);
+    }
+  }
+}
+
+}  // namespace hybrid_slam
