@@ -48,8 +48,8 @@ struct TrackRefiner::Reference {
 };
 
 std::string TrackRefinementOptions::validate() const {
-  if (keyframes < 1 || min_sigma <= 0 || max_view_angle_deg <= 0) {
-    return "refinement: keyframes, min_sigma and max_view_angle_deg must be positive";
+  if (keyframes < 1 || sigma <= 0 || max_view_angle_deg <= 0) {
+    return "refinement: keyframes, sigma and max_view_angle_deg must be positive";
   }
   return alignment.validate();
 }
@@ -126,7 +126,7 @@ bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landm
   const auto shift = static_cast<float>(aligned.position.x()) - keypoint.x;
   keypoint.x += shift;
   keypoint.y = static_cast<float>(aligned.position.y());
-  keypoint.sigma = static_cast<float>(std::max(options_.min_sigma, aligned.sigma));
+  keypoint.sigma = static_cast<float>(std::ldexp(options_.sigma, patch->level));
   if (!frame.features.u_right.empty()) {
     frame.features.u_right[index] += shift;  // the disparity stays
   }

@@ -1,0 +1,88 @@
+#include "apps/hybrid_slam/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include "apps/pipeline/slam_run.h"
+
+namespace hybrid_slam {
+namespace {
+
+constexpr const char* kFooter = R"(Writes to DIR:
+  stereo.tum         every tracked frame, final estimate (world_from_cam of the left camera)
+  stereo_online.tum  the estimate at the moment each frame was tracked
+  map.ply, map.png   landmarks and keyframes; map and path from above and from the side
+  timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
+  summary.json       frames, keyframes, landmarks, options, and ATE where the dataset has truth
+
+Exit codes: 0 done; 1 internal error; 2 bad usage; 3 bad input (dataset, configuration or output
+folder); 4 no frame could be tracked; 130 interrupted, what there was is saved.)";
+
+}  // namespace
+
+std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code) {
+  CommandLine line;
+  std::string config;
+  std::string cameras = "stereo";
+  std::optional<int> features;
+  std::optional<std::uint64_t> seed;
+  const std::map<std::string, SequenceLayout> layouts{{"auto", SequenceLayout::kAuto},
+                                                      {"kitti", SequenceLayout::kKitti},
+                                                      {"euroc", SequenceLayout::kEuroc},
+                                                      {"uwslam", SequenceLayout::kUwslam}};
+  const std::map<std::string, RunMode> modes{{"every-frame", RunMode::kEveryFrame},
+                                             {"realtime", RunMode::kRealtime}};
+
+  CLI::App app("Visual SLAM on a stereo image sequence.", "hybrid_slam");
+  app.footer(kFooter);
+  app.add_option("DATASET", line.dataset, "folder of the dataset")->required();
+  app.add_option("--layout", line.layout, "auto, kitti, euroc or uwslam")
+      ->transform(CLI::CheckedTransformer(layouts).description(""))
+      ->option_text("NAME");
+  app.add_option("--sequence", line.sequence, "sequence of the dataset; the only one if not given");
+  app.add_option("--config", config, "YAML file with options");
+  app.add_option("--out", line.out, "folder for the results, made if missing")
+      ->capture_default_str();
+  app.add_option(
+         "--mode", line.mode,
+         "every-frame (default: each frame is mapped before the next, repeatable) or realtime")
+      ->transform(CLI::CheckedTransformer(modes).description(""))
+      ->option_text("MODE");
+  app.add_option("--rate", line.rate,
+                 "realtime: images per second; those that come too early are dropped and counted")
+      ->check(CLI::PositiveNumber.description(""));
+  app.add_option("--cameras", cameras, "stereo (hybrid: not in this version)")
+      ->check(CLI::IsMember({"stereo", "hybrid"}).description(""))
+      ->option_text("WHICH");
+  app.add_option("--features", features, "features per image (default 2000)")
+      ->check(CLI::Range(50, 100000).description(""));
+  app.add_option("--seed", seed, "of every random choice (default 0)");
+  app.add_option("--threads", line.threads, "that extract features (default: one per core)")
+      ->check(CLI::Range(1, 256).description(""));
+  app.add_option("--limit", line.limit, "process so many frames at most");
+  app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
+  try {
+    app.parse(argc, argv);
+    if (line.rate > 0 && line.mode != RunMode::kRealtime) {
+      throw CLI::ValidationError("--rate needs --mode realtime");
+    }
+    if (cameras == "hybrid") {
+      throw CLI::ValidationError("--cameras hybrid is not in this version");
+    }
+  } catch (const CLI::ParseError& error) {
+    exit_code = app.exit(error) == 0 ? kExitOk : kExitBadUsage;
+    return std::nullopt;
+  }
+  if (!config.empty()) {
+    line.options = read_slam_options(config);
+  }
+  line.options.features = features.value_or(line.options.features);
+  line.options.seed = seed.value_or(line.options.seed);
+  line.options.distribute();
+  if (line.threads == 0) {
+    line.threads = default_thread_count();
+  }
+  return line;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "apps/pipeline/slam_options.h"
+#include "frontend/input/image_sequence.h"
+
+namespace hybrid_slam {
+
+enum class RunMode { kEveryFrame, kRealtime };
+
+// What the user asked for.
+struct CommandLine {
+  std::string dataset;
+  SequenceLayout layout = SequenceLayout::kAuto;
+  std::string sequence;
+  std::string out = "out";
+  RunMode mode = RunMode::kEveryFrame;
+  double rate = 0;  // [Hz]; 0: images wait for the pipeline
+  int threads = 0;  // 0: one per core
+  std::size_t limit = 0;
+  bool quiet = false;
+  SlamOptions options;
+};
+
+// Exit codes of the program, as --help lists them.
+enum ExitCode : int {
+  kExitOk = 0,
+  kExitInternalError = 1,
+  kExitBadUsage = 2,
+  kExitBadInput = 3,
+  kExitNothingTracked = 4,
+  kExitInterrupted = 130
+};
+
+// Reads the command line and the configuration file it names. Empty if the program shall end at
+// once with `exit_code` (help, or bad usage, which has been reported). Throws InputError for the
+// file.
+std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code);
+
+}  // namespace hybrid_slam

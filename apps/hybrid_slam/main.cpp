@@ -1,0 +1,108 @@
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+
+#include "apps/hybrid_slam/command_line.h"
+#include "apps/hybrid_slam/outputs.h"
+#include "apps/hybrid_slam/progress.h"
+#include "apps/io/output_file.h"
+#include "cameras/input_error.h"
+
+namespace hybrid_slam {
+namespace {
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
+
+// The first Ctrl-C ends the run in order; a second one kills the program as usual.
+void on_signal(int signal) {
+  interrupted = true;
+  std::signal(signal, SIG_DFL);
+}
+
+// Before hours of work, not after: can the results be written?
+void make_output_folder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    throw OutputError(folder + ": cannot be made: " + error.message());
+  }
+  write_file(std::filesystem::path(folder) / "summary.json", "{}\n");
+}
+
+int run(const CommandLine& line) {
+  const auto sequence = open_sequence(line.dataset, line.layout, line.sequence);
+  make_output_folder(line.out);
+  for (const std::string& warning : sequence->info().warnings) {
+    spdlog::warn(warning);
+  }
+  if (!line.quiet) {
+    spdlog::info("{} ({}): {} stereo frames of {}x{}", sequence->info().name,
+                 sequence->info().layout, sequence->size(), sequence->info().stereo.width,
+                 sequence->info().stereo.height);
+  }
+  ProgressPrinter progress(line.quiet);
+  RunHooks hooks;
+  hooks.progress = [&](const RunProgress& state) { progress(state); };
+  hooks.warning = [&](const std::string& text) {
+    progress.finish();
+    spdlog::warn(text);
+  };
+  hooks.cancelled = &interrupted;
+  RunOptions options;
+  options.threads = line.threads;
+  options.limit = line.limit;
+  options.rate = line.rate;
+
+  const ImageFrameSource source(*sequence, line.options);
+  const auto start = std::chrono::steady_clock::now();
+  const RunResult result = line.mode == RunMode::kRealtime
+                               ? run_realtime(source, line.options, options, hooks)
+                               : run_every_frame(source, line.options, options, hooks);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  progress.finish();
+  const RunSummary summary = write_outputs(line, sequence->info(), result, elapsed.count());
+  print_summary(line, result, summary);
+  if (result.cancelled) {
+    spdlog::warn("interrupted: results up to frame {} are saved", result.frames.read);
+    return kExitInterrupted;
+  }
+  if (result.frames.tracked == 0) {
+    spdlog::error("no frame could be tracked: too few features or stereo matches to start a map");
+    return kExitNothingTracked;
+  }
+  return kExitOk;
+}
+
+int guarded_main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("hybrid_slam"));
+  spdlog::set_pattern("%n: %^%l%$: %v");
+  try {
+    int exit_code = kExitOk;
+    const auto line = parse_command_line(argc, argv, exit_code);
+    if (!line) {
+      return exit_code;
+    }
+    std::signal(SIGINT, on_signal);
+    std::signal(SIGTERM, on_signal);
+    return run(*line);
+  } catch (const InputError& error) {
+    spdlog::error(error.what());
+    return kExitBadInput;
+  } catch (const OutputError& error) {
+    spdlog::error(error.what());
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    spdlog::critical("internal error: {}", error.what());
+    return kExitInternalError;
+  }
+}
+
+}  // namespace
+}  // namespace hybrid_slam
+
+int main(int argc, char** argv) { return hybrid_slam::guarded_main(argc, argv); }

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "apps/hybrid_slam/command_line.h"
+#include "apps/io/trajectory.h"
+#include "apps/pipeline/slam_run.h"
+
+namespace hybrid_slam {
+
+// What is told of a run, in summary.json and on the screen.
+struct RunSummary {
+  double seconds = 0;                // from the first image to the last
+  std::optional<AbsoluteError> ate;  // where the dataset has truth; SE3 alignment
+};
+
+// Writes every file of the run into line.out. Throws OutputError.
+RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
+                         const RunResult& result, double seconds);
+
+// A few lines for people.
+void print_summary(const CommandLine& line, const RunResult& result, const RunSummary& summary);
+
+}  // namespace hybrid_slam
