@@ -6,6 +6,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "cameras/geometry/se3.h"
 #include "test/frontend/pose/pose_scene.h"
 #include "test/support/random.h"
 
@@ -87,6 +88,43 @@ TEST_CASE("stereo motion survives 40 % outliers", "[odometry]") {
     for (const int i : found->inliers) wrong += scene.is_outlier[static_cast<std::size_t>(i)];
     CHECK(wrong == 0);
     CHECK(found->inliers.size() > 120);
+  }
+}
+
+// The cost that VISO2 minimises, written down once more.
+double weighted_cost(const Scene& scene, const std::vector<int>& inliers, const Rigid3d& motion) {
+  const auto& [fx, fy, cx, cy, base] = scene.camera.params;
+  double cost = 0;
+  for (const int i : inliers) {
+    const StereoCorrespondence& c = scene.correspondences[static_cast<std::size_t>(i)];
+    const double z = fx * base / (c.previous[0] - c.previous[2]);
+    const Eigen::Vector3d p =
+        motion * Eigen::Vector3d(z * (c.previous[0] - cx) / fx, z * (c.previous[1] - cy) / fy, z);
+    const double u = fx * p.x() / p.z() + cx;
+    const double v = fy * p.y() / p.z() + cy;
+    const Eigen::Vector4d predicted(u, v, u - fx * base / p.z(), v);
+    const double weight = 1 / (std::abs(c.current[0] - cx) / cx + 0.05);
+    cost += weight * weight * (predicted - c.current).squaredNorm();
+  }
+  return cost;
+}
+
+TEST_CASE("stereo motion minimises the weighted reprojection error", "[odometry]") {
+  const Scene scene = make_scene({.outlier_share = 0.2, .noise = 0.3, .seed = 4});
+  const auto found = scene.solve();
+  REQUIRE(found);
+  const auto cost = [&](const Vector6d& delta) {
+    return weighted_cost(scene, found->inliers, se3_exp(delta) * found->current_from_previous);
+  };
+  const double at_solution = cost(Vector6d::Zero());
+  for (int axis = 0; axis < 6; ++axis) {
+    // How far from the solution the parabola through three points has its minimum.
+    const double h = 1e-4;
+    const Vector6d step = h * Vector6d::Unit(axis);
+    const double ahead = cost(step), behind = cost(-step);
+    const double curvature = ahead + behind - 2 * at_solution;
+    CHECK(curvature > 0);
+    CHECK(std::abs(h * (behind - ahead) / (2 * curvature)) < 1e-6);
   }
 }
 
