@@ -15,7 +15,7 @@ namespace hybrid_slam {
 
 struct TrackRefinementOptions {
   bool enabled = true;
-  int keyframes = 30;       // of which the images are kept as references, newest
+  int keyframes = 30;              // of which the images are kept as references, newest
   double sigma = 0.15;             // standard deviation of an aligned position [px of its level]
   double max_view_angle_deg = 35;  // between the two views of a patch
   AlignmentOptions alignment;
