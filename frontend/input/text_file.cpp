@@ -21,7 +21,7 @@ std::string_view trim(std::string_view text) {
 
 std::string quote(std::string_view field) {
   std::string quoted(1, '"');
-  quoted += field.substr(0, kMaxQuoted);
+  for (const char c : field.substr(0, kMaxQuoted)) quoted += c >= ' ' && c <= '~' ? c : '?';
   quoted += '"';
   return quoted;
 }
@@ -35,10 +35,11 @@ InputError line_error(const fs::path& path, int line, std::string_view reason) {
 std::vector<TextLine> read_lines(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw InputError(path.string() + ": no such file");
-  std::ifstream file(path);
-  if (!file || !fs::is_regular_file(path, ignored)) {
-    throw InputError(path.string() + ": cannot be read");
-  }
+  // Checked before opening: to open a pipe waits for its writer.
+  const bool is_regular = fs::is_regular_file(path, ignored);
+  std::ifstream file;
+  if (is_regular) file.open(path);
+  if (!file.is_open()) throw InputError(path.string() + ": cannot be read");
   std::vector<TextLine> lines;
   std::string text;
   for (int number = 1; std::getline(file, text); ++number) {

@@ -28,6 +28,9 @@ TEST_CASE("what is no finite number is refused with its line") {
     INFO(bad);
     CHECK(line.find(path.string() + ":3: ") == 0);
   }
+  write_text(path, std::string("1\n\0\x1b[2J\n", 7));
+  CHECK(complaint([&] { read_number_rows(path, ' '); }).find(":2: \"??[2J\" is not a number") !=
+        std::string::npos);
   write_text(path, "1,,2\n");
   CHECK(complaint([&] { read_number_rows(path, ','); }).find(":1: ") != std::string::npos);
 }
