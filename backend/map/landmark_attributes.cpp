@@ -3,17 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 namespace hybrid_slam {
 
 namespace {
 
-constexpr std::size_t kMaxCompared = 12;
+constexpr std::size_t kMaxCompared = 8;
 
 int squared_distance(const Descriptor& a, const Descriptor& b) {
   int sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    const int difference = int{a[i]} - int{b[i]};
+    // 16 bits: what the compiler can multiply and add pairwise.
+    const auto difference = static_cast<std::int16_t>(a[i] - b[i]);
     sum += difference * difference;
   }
   return sum;

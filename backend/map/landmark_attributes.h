@@ -6,7 +6,7 @@ namespace hybrid_slam {
 
 // The attributes of a landmark that derive from its observations (backend/map/landmark.h).
 
-// The descriptor with the least median distance to the others. Of more than 12 observations, 12
+// The descriptor with the least median distance to the others. Of more than 8 observations, 8
 // spread evenly over them take part: the cost stays bounded, the median hardly changes.
 void update_appearance(const MapTables& tables, Landmark& landmark);
 

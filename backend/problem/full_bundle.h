@@ -6,7 +6,7 @@
 namespace hybrid_slam {
 
 struct FullBundleOptions {
-  ProblemOptions problem{.rounds = {{10, true}, {20, false}}, .function_tolerance = 1e-8};
+  ProblemOptions problem{.rounds = {{10, true, 1e-4}, {20, false, 1e-8}}};
 };
 
 // Bundle adjustment of every keyframe but the origin and of every landmark.

@@ -14,16 +14,16 @@ namespace hybrid_slam {
 // their chi2 threshold set aside.
 struct SolveRound {
   int iterations = 10;
-  bool robust = false;  // Huber's loss, at the square root of the chi2 threshold
+  bool robust = false;               // Huber's loss, at the square root of the chi2 threshold
+  double function_tolerance = 1e-6;  // ends below this relative decrease of the cost
 };
 
 struct ProblemOptions {
-  std::vector<SolveRound> rounds{{5, true}, {10, false}};
-  double chi2_mono = 5.991;          // 95 %, 2 degrees of freedom
-  double chi2_stereo = 7.815;        // 95 %, 3 degrees of freedom
-  double function_tolerance = 1e-6;  // stop below this relative decrease of the cost
-  int max_dense_poses = 60;          // up to so many the reduced camera system is solved dense
-  int threads = 1;                   // inside the solver; more than 1 gives up repeatability
+  std::vector<SolveRound> rounds{{5, true, 1e-3}, {10, false, 1e-5}};
+  double chi2_mono = 5.991;    // 95 %, 2 degrees of freedom
+  double chi2_stereo = 7.815;  // 95 %, 3 degrees of freedom
+  int max_dense_poses = 60;    // up to so many the reduced camera system is solved dense
+  int threads = 1;             // inside the solver; more than 1 gives up repeatability
 
   // Empty if the values can be used, else what is wrong.
   std::string validate() const;

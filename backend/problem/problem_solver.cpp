@@ -56,7 +56,7 @@ ceres::Solver::Options solver_options(AssembledProblem& assembled, const ceres::
   solver.linear_solver_type = dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   solver.linear_solver_ordering = elimination_order(assembled, problem);
   solver.max_num_iterations = round.iterations;
-  solver.function_tolerance = options.function_tolerance;
+  solver.function_tolerance = round.function_tolerance;
   solver.num_threads = options.threads;
   solver.logging_type = ceres::SILENT;
   return solver;

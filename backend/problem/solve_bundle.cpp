@@ -80,9 +80,9 @@ std::string ProblemOptions::validate() const {
   if (rounds.empty()) return "rounds: at least one is needed";
   for (const SolveRound& round : rounds) {
     if (round.iterations < 1) return "rounds: iterations must be positive";
+    if (!(round.function_tolerance >= 0)) return "rounds: tolerance must not be negative";
   }
   if (!(chi2_mono > 0) || !(chi2_stereo > 0)) return "chi2 thresholds must be positive";
-  if (!(function_tolerance >= 0)) return "function_tolerance must not be negative";
   if (max_dense_poses < 0) return "max_dense_poses must not be negative";
   if (threads < 1) return "threads must be positive";
   return {};

@@ -20,9 +20,8 @@ constexpr FillOptions kNoisyStart{
 // covariance is known.
 ProblemOptions without_rejection() {
   ProblemOptions options;
-  options.rounds = {{10, true}, {20, false}};
+  options.rounds = {{10, true, 1e-4}, {20, false, 1e-10}};
   options.chi2_mono = options.chi2_stereo = 60;
-  options.function_tolerance = 1e-10;
   return options;
 }
 
@@ -241,8 +240,7 @@ TEST_CASE("A stopped optimisation keeps what it has and erases nothing") {
     later.request_stop();
   });
   ProblemConfig endless = config;
-  endless.options.rounds = {{10000, false}};
-  endless.options.function_tolerance = 0;
+  endless.options.rounds = {{10000, false, 0}};
   const BundleResult result = solve_bundle(filled.map.view(), endless, later.get_token());
   CHECK((result.summary.end == SolveEnd::kStopped || result.summary.end == SolveEnd::kConverged));
   CHECK(result.summary.iterations < 10000);
@@ -276,7 +274,7 @@ TEST_CASE("No result comes from values that are not finite, from nothing, or fro
   ProblemConfig config = make_full_bundle(filled.map.view(), {});
   AssembledProblem problem = assemble_problem(filled.map.view(), config);
   problem.poses[0].translation().x() = std::numeric_limits<double>::quiet_NaN();
-  CHECK(solve_round(problem, {}, {5, false}, {}).end == SolveEnd::kFailed);
+  CHECK(solve_round(problem, {}, {5, false, 0}, {}).end == SolveEnd::kFailed);
 
   CHECK(solve_bundle(filled.map.view(), {}).summary.end == SolveEnd::kEmpty);
   ProblemConfig stale = config;  // as if made from an older snapshot
