@@ -77,6 +77,8 @@ void read_stereo(Section section, StereoMatcherOptions& options) {
       .field("max_descriptor_distance", options.max_descriptor_distance)
       .field("ratio", options.ratio)
       .field("refine", options.refine)
+      .field("horizontal_only", options.alignment.horizontal_only)
+      .field("patch_half_size", options.alignment.half_size)
       .refuse_unknown();
 }
 

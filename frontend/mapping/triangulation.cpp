@@ -15,8 +15,8 @@ namespace {
 // A keypoint without a landmark, and its ray.
 struct OpenKeypoint {
   std::uint32_t index = 0;
-  Eigen::Vector3d bearing;   // unit, in the camera
-  double angular_sigma = 0;  // [rad]
+  Eigen::Vector3d bearing;      // unit, in the camera
+  double angular_variance = 0;  // [rad^2]
 };
 
 struct View {
@@ -41,7 +41,8 @@ View make_view(const MapSnapshot& map, KeyframeId id) {
     }
     const auto bearing = unproject(*view.camera, Eigen::Vector2d(keypoint.x, keypoint.y));
     if (bearing) {
-      view.open.push_back({static_cast<std::uint32_t>(i), *bearing, keypoint.sigma / view.focal});
+      const double sigma = keypoint.sigma / view.focal;
+      view.open.push_back({static_cast<std::uint32_t>(i), *bearing, sigma * sigma});
     }
   }
   return view;
@@ -87,10 +88,11 @@ std::optional<OpenKeypoint> match_along_epipolar(const View& a, const OpenKeypoi
   int best = std::numeric_limits<int>::max();
   int second = best;
   const OpenKeypoint* found = nullptr;
+  const double band_factor = options.epipolar_sigmas * options.epipolar_sigmas;
   for (const OpenKeypoint& candidate : b.open) {
-    const double band =
-        options.epipolar_sigmas * std::hypot(candidate.angular_sigma, ray.angular_sigma);
-    if (std::abs(normal.dot(candidate.bearing)) > band) {
+    const double off_plane = normal.dot(candidate.bearing);
+    if (off_plane * off_plane >
+        band_factor * (candidate.angular_variance + ray.angular_variance)) {
       continue;
     }
     const int distance =
