@@ -61,11 +61,16 @@ bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
 }  // namespace
 
 std::string CullingOptions::validate() const {
-  if (min_found_ratio < 0 || min_found_ratio > 1 || min_observations < 1 || probation < 1 ||
-      redundant_share <= 0 || redundant_share > 1 || redundant_observers < 1 ||
-      close_baselines <= 0) {
-    return "culling: a value is out of range";
+  if (!(min_found_ratio >= 0 && min_found_ratio <= 1)) {
+    return "culling: min_found_ratio must lie in [0, 1]";
   }
+  if (!(redundant_share > 0 && redundant_share <= 1)) {
+    return "culling: redundant_share must lie in (0, 1]";
+  }
+  if (min_observations < 1 || probation < 1 || redundant_observers < 1) {
+    return "culling: min_observations, probation and redundant_observers must be positive";
+  }
+  if (!(close_baselines > 0)) return "culling: close_baselines must be positive";
   return {};
 }
 

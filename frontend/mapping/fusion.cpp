@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
@@ -98,10 +99,14 @@ void append_landmarks(const MapSnapshot& map, KeyframeId id, std::vector<Landmar
 }  // namespace
 
 std::string FusionOptions::validate() const {
-  if (neighbours < 0 || second_neighbours < 0 || radius <= 0 || max_descriptor_distance <= 0 ||
-      max_scale_ratio < 1 || chi2_mono <= 0 || chi2_stereo <= 0) {
-    return "fusion: a value is out of range";
+  if (neighbours < 0 || second_neighbours < 0) {
+    return "fusion: neighbours and second_neighbours must not be negative";
   }
+  if (!(radius > 0) || !(max_descriptor_distance > 0)) {
+    return "fusion: radius and max_descriptor_distance must be positive";
+  }
+  if (!(max_scale_ratio >= 1)) return "fusion: max_scale_ratio must not be below 1";
+  if (!(chi2_mono > 0) || !(chi2_stereo > 0)) return "fusion: chi2 thresholds must be positive";
   return {};
 }
 

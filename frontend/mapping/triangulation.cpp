@@ -91,8 +91,7 @@ std::optional<OpenKeypoint> match_along_epipolar(const View& a, const OpenKeypoi
   const double band_factor = options.epipolar_sigmas * options.epipolar_sigmas;
   for (const OpenKeypoint& candidate : b.open) {
     const double off_plane = normal.dot(candidate.bearing);
-    if (off_plane * off_plane >
-        band_factor * (candidate.angular_variance + ray.angular_variance)) {
+    if (off_plane * off_plane > band_factor * (candidate.angular_variance + ray.angular_variance)) {
       continue;
     }
     const int distance =
@@ -219,10 +218,20 @@ void triangulate_pair(View& a, View& b, const TriangulationOptions& options,
 }  // namespace
 
 std::string TriangulationOptions::validate() const {
-  if (stereo_neighbours < 0 || mono_neighbours < 0 || min_baseline_ratio < 0 ||
-      max_descriptor_distance <= 0 || ratio <= 0 || ratio > 1 || epipolar_sigmas <= 0 ||
-      max_scale_ratio < 1 || chi2_mono <= 0 || chi2_stereo <= 0) {
-    return "triangulation: a value is out of range";
+  if (stereo_neighbours < 0 || mono_neighbours < 0) {
+    return "triangulation: stereo_neighbours and mono_neighbours must not be negative";
+  }
+  if (!(min_baseline_ratio >= 0)) return "triangulation: min_baseline_ratio must not be negative";
+  if (!(max_parallax_cosine > 0 && max_parallax_cosine <= 1)) {
+    return "triangulation: max_parallax_cosine must lie in (0, 1]";
+  }
+  if (!(max_descriptor_distance > 0) || !(epipolar_sigmas > 0)) {
+    return "triangulation: max_descriptor_distance and epipolar_sigmas must be positive";
+  }
+  if (!(ratio > 0 && ratio <= 1)) return "triangulation: ratio must lie in (0, 1]";
+  if (!(max_scale_ratio >= 1)) return "triangulation: max_scale_ratio must not be below 1";
+  if (!(chi2_mono > 0) || !(chi2_stereo > 0)) {
+    return "triangulation: chi2 thresholds must be positive";
   }
   return {};
 }

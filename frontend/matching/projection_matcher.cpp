@@ -86,6 +86,19 @@ Best search(const FeatureView& view, const LandmarkPrediction& prediction,
 
 }  // namespace
 
+std::string ProjectionMatcherOptions::validate() const {
+  if (!(radius > 0) || !(max_scaled_radius > 0)) {
+    return "matcher: radius and max_scaled_radius must be positive";
+  }
+  if (!(max_descriptor_distance > 0)) return "matcher: max_descriptor_distance must be positive";
+  if (!(ratio > 0 && ratio <= 1)) return "matcher: ratio must lie in (0, 1]";
+  if (!(max_scale_ratio >= 1)) return "matcher: max_scale_ratio must not be below 1";
+  if (!(max_view_angle_deg > 0 && max_view_angle_deg <= 180)) {
+    return "matcher: max_view_angle_deg must lie in (0, 180]";
+  }
+  return {};
+}
+
 std::vector<LandmarkPrediction> predict_landmarks(const MapSnapshot& map, const Camera& camera,
                                                   const Rigid3d& cam_from_world,
                                                   std::span<const LandmarkId> ids,

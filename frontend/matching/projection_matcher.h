@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -35,6 +36,9 @@ struct ProjectionMatcherOptions {
   double ratio = 0.8;                    // best against second best at a similar scale
   double max_scale_ratio = 1.7;          // between predicted and observed scale, either way
   double max_view_angle_deg = 60;        // to the mean viewing direction
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
 };
 
 // A keypoint found for a landmark.

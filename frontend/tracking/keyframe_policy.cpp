@@ -3,13 +3,13 @@
 namespace hybrid_slam {
 
 std::string KeyframePolicyOptions::validate() const {
-  if (min_tracked_ratio <= 0 || min_tracked_ratio > 1 || min_tracked_ratio_young <= 0 ||
-      min_tracked_ratio_young > 1) {
+  const auto is_share = [](double value) { return value > 0 && value <= 1; };
+  if (!is_share(min_tracked_ratio) || !is_share(min_tracked_ratio_young)) {
     return "keyframes: tracked ratios must lie in (0, 1]";
   }
-  if (min_inliers < 0 || min_close_tracked < 0 || min_close_untracked < 0 ||
-      max_frames_between < 1 || min_motion < 0) {
-    return "keyframes: counts must not be negative, max_frames_between at least 1";
+  if (min_inliers < 0 || !(min_close_tracked >= 0) || min_close_untracked < 0 ||
+      max_frames_between < 1 || !(min_motion >= 0)) {
+    return "keyframes: counts and shares must not be negative, max_frames_between at least 1";
   }
   return {};
 }

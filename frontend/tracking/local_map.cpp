@@ -54,6 +54,13 @@ void add_neighbours(const MapSnapshot& map, const LocalMapOptions& options, Loca
 
 }  // namespace
 
+std::string LocalMapOptions::validate() const {
+  if (max_keyframes < 1 || neighbours_per_keyframe < 0) {
+    return "local map: max_keyframes must be positive, neighbours_per_keyframe not negative";
+  }
+  return {};
+}
+
 LocalMap make_local_map(const MapSnapshot& map, const std::vector<LandmarkId>& tracked,
                         const LocalMapOptions& options) {
   LocalMap local;

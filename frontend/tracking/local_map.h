@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "backend/map/map_snapshot.h"
@@ -9,6 +10,9 @@ namespace hybrid_slam {
 struct LocalMapOptions {
   int max_keyframes = 80;
   int neighbours_per_keyframe = 10;  // covisible keyframes added for each one that shares landmarks
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
 };
 
 // The part of the map around a frame.

@@ -122,6 +122,20 @@ std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const Featu
 
 }  // namespace
 
+std::string RelocalizationOptions::validate() const {
+  if (max_keyframes < 0 || min_matches < 0 || min_inliers < 0) {
+    return "relocalization: max_keyframes, min_matches and min_inliers must not be negative";
+  }
+  if (!(ratio > 0 && ratio <= 1)) return "relocalization: ratio must lie in (0, 1]";
+  if (!(max_descriptor_distance > 0) || !(wide_radius > 0) || !(narrow_radius > 0)) {
+    return "relocalization: max_descriptor_distance and radii must be positive";
+  }
+  if (!(ransac.confidence > 0 && ransac.confidence < 1) || ransac.max_iterations < 1) {
+    return "relocalization: ransac: confidence must lie in (0, 1), max_iterations be positive";
+  }
+  return {};
+}
+
 std::vector<LandmarkId> match_keyframe(const MapSnapshot& map, KeyframeId keyframe,
                                        const FeatureSet& features, double ratio,
                                        double max_descriptor_distance) {

@@ -19,6 +19,9 @@ struct RelocalizationOptions {
   double wide_radius = 10;   // [px]
   double narrow_radius = 3;  // [px]
   PnpRansacOptions ransac;
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
 };
 
 struct RelocalizedFrame {

@@ -48,10 +48,11 @@ struct TrackRefiner::Reference {
 };
 
 std::string TrackRefinementOptions::validate() const {
-  if (keyframes < 1 || sigma <= 0 || max_view_angle_deg <= 0) {
+  if (keyframes < 1 || !(sigma > 0) || !(max_view_angle_deg > 0)) {
     return "refinement: keyframes, sigma and max_view_angle_deg must be positive";
   }
-  return alignment.validate();
+  const std::string error = alignment.validate();
+  return error.empty() ? error : "refinement: " + error;
 }
 
 TrackRefiner::TrackRefiner(CameraId camera_id, const Camera& camera,
