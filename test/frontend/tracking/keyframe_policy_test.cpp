@@ -1,0 +1,99 @@
+#include "frontend/tracking/keyframe_policy.h"
+
+#include <catch2/catch.hpp>
+#include <limits>
+
+namespace hybrid_slam {
+namespace {
+
+// A frame that needs no keyframe; each row below changes what it names.
+KeyframeEvidence quiet() {
+  KeyframeEvidence evidence;
+  evidence.inliers = 400;
+  evidence.reference_landmarks = 500;
+  evidence.close_tracked = 300;
+  evidence.close_untracked = 30;
+  evidence.frames_since_keyframe = 5;
+  evidence.keyframes = 10;
+  evidence.motion = 0.1;
+  return evidence;
+}
+
+TEST_CASE("When a frame becomes a keyframe") {
+  struct Row {
+    const char* name;
+    void (*change)(KeyframeEvidence&);
+    bool expected;
+  };
+  const Row rows[] = {
+      {"nothing to gain", [](KeyframeEvidence&) {}, false},
+      {"share tracked just above 0.75", [](KeyframeEvidence& e) { e.inliers = 376; }, false},
+      {"share tracked just below 0.75", [](KeyframeEvidence& e) { e.inliers = 374; }, true},
+      {"a young map bears 0.4",
+       [](KeyframeEvidence& e) {
+         e.keyframes = 1;
+         e.inliers = 201;
+       },
+       false},
+      {"but not less",
+       [](KeyframeEvidence& e) {
+         e.keyframes = 1;
+         e.inliers = 199;
+       },
+       true},
+      {"hardly tracked at all", [](KeyframeEvidence& e) { e.inliers = 15; }, false},
+      {"just tracked", [](KeyframeEvidence& e) { e.inliers = 16; }, true},
+      {"few close points, many to be had",
+       [](KeyframeEvidence& e) {
+         e.close_tracked = 199;
+         e.close_untracked = 61;
+       },
+       true},
+      {"few close points, few to be had",
+       [](KeyframeEvidence& e) {
+         e.close_tracked = 199;
+         e.close_untracked = 60;
+       },
+       false},
+      {"close points enough",
+       [](KeyframeEvidence& e) {
+         e.close_tracked = 200;
+         e.close_untracked = 500;
+       },
+       false},
+      {"long ago and moving", [](KeyframeEvidence& e) { e.frames_since_keyframe = 15; }, true},
+      {"long ago and standing",
+       [](KeyframeEvidence& e) {
+         e.frames_since_keyframe = 100;
+         e.motion = 0.019;
+       },
+       false},
+      {"the odometer alone holds the track",
+       [](KeyframeEvidence& e) {
+         e.by_odometry = true;
+         e.inliers = 0;
+       },
+       true},
+  };
+  for (const Row& row : rows) {
+    KeyframeEvidence evidence = quiet();
+    row.change(evidence);
+    INFO(row.name);
+    CHECK(needs_keyframe(evidence, 2000, {}) == row.expected);
+  }
+}
+
+TEST_CASE("Keyframe options out of range are refused") {
+  CHECK(KeyframePolicyOptions{}.validate().empty());
+  for (const double ratio : {0.0, 1.1, std::numeric_limits<double>::quiet_NaN()}) {
+    KeyframePolicyOptions options;
+    options.min_tracked_ratio = ratio;
+    CHECK(!options.validate().empty());
+  }
+  KeyframePolicyOptions options;
+  options.max_frames_between = 0;
+  CHECK(!options.validate().empty());
+}
+
+}  // namespace
+}  // namespace hybrid_slam
