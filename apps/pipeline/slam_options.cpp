@@ -101,6 +101,14 @@ void read_odometer(Section section, StereoOdometerOptions& options) {
       .refuse_unknown();
 }
 
+void read_disparity(Section section, DisparityCalibratorOptions& options) {
+  section.field("enabled", options.enabled)
+      .field("prior_sigma", options.prior_sigma)
+      .field("min_significance", options.min_significance)
+      .field("min_matches", options.min_matches)
+      .refuse_unknown();
+}
+
 void read_refinement(Section section, TrackRefinementOptions& options) {
   section.field("enabled", options.enabled)
       .field("keyframes", options.keyframes)
@@ -111,6 +119,7 @@ void read_refinement(Section section, TrackRefinementOptions& options) {
 
 void read_tracking(Section section, StereoTrackerOptions& options) {
   read_odometer(section.section("odometer"), options.odometer);
+  read_disparity(section.section("disparity"), options.disparity);
   read_keyframes(section.section("keyframes"), options.keyframes);
   read_refinement(section.section("refinement"), options.refinement);
   section.section("matcher")

@@ -20,6 +20,7 @@ struct Frame {
   KeypointGrid grid;                         // over the left keypoints
   std::shared_ptr<const ImagePyramid> left;  // null where there are features only
 
+  double u_right_correction = 0;  // [px] subtracted from what was measured
   Rigid3d cam_from_world;
   std::vector<LandmarkId> landmarks;  // one per left keypoint; invalid where there is none
 

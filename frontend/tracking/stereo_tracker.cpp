@@ -52,7 +52,7 @@ std::string StereoTrackerOptions::validate() const {
     return "tracking: shares, radii and close_baselines must be positive";
   }
   for (const std::string& error :
-       {odometer.validate(), keyframes.validate(), refinement.validate()}) {
+       {odometer.validate(), disparity.validate(), keyframes.validate(), refinement.validate()}) {
     if (!error.empty()) {
       return error;
     }
@@ -97,6 +97,7 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
       camera_(camera),
       options_(options),
       odometer_(camera, options.odometer),
+      disparity_(camera, options.disparity),
       refiner_(camera_id, camera, options.refinement) {
   const std::string error = options.validate();
   if (!error.empty()) {
@@ -111,9 +112,11 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
     return result;
   }
   follow_map(map);
+  correct_disparities(frame);
   TrackedFrame result;
   result.frame_index = frame.index;
   result.time = frame.time;
+  result.disparity_offset = frame.u_right_correction;
   if (last_tracked_) {
     predict(frame, result);
     const Rigid3d predicted = frame.cam_from_world;
@@ -183,6 +186,13 @@ TrackedFrame StereoTracker::initialize(Frame& frame) const {
   return result;
 }
 
+void StereoTracker::correct_disparities(Frame& frame) const {
+  frame.u_right_correction = disparity_.offset();
+  for (float& u_right : frame.features.u_right) {
+    u_right -= static_cast<float>(frame.u_right_correction);
+  }
+}
+
 // Odometer and predicted pose; constant velocity, then the last pose, where the odometer fails.
 void StereoTracker::predict(Frame& frame, TrackedFrame& result) {
   const auto motion = odometer_.estimate(last_->features, frame.features);
@@ -190,6 +200,8 @@ void StereoTracker::predict(Frame& frame, TrackedFrame& result) {
     result.prediction = Prediction::kOdometer;
     result.odometer_inliers = static_cast<int>(motion->inliers.size());
     frame.cam_from_world = motion->current_from_previous * last_->cam_from_world;
+    disparity_.add(last_->features, last_->u_right_correction, frame.features,
+                   frame.u_right_correction, *motion);
   } else if (velocity_) {
     result.prediction = Prediction::kConstantVelocity;
     frame.cam_from_world = *velocity_ * last_->cam_from_world;

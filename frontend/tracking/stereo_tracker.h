@@ -7,6 +7,7 @@
 #include "backend/map/map_edit.h"
 #include "backend/map/map_snapshot.h"
 #include "frontend/matching/projection_matcher.h"
+#include "frontend/odometry/disparity_calibrator.h"
 #include "frontend/odometry/stereo_odometer.h"
 #include "frontend/pose/pose_refinement.h"
 #include "frontend/tracking/frame.h"
@@ -31,6 +32,7 @@ struct StereoTrackerOptions {
   int min_local_map_inliers = 30;
   int min_odometer_inliers = 20;  // to go on by odometry where the map does not hold
   StereoOdometerOptions odometer;
+  DisparityCalibratorOptions disparity;
   ProjectionMatcherOptions matcher;
   PoseRefinementOptions pose;
   LocalMapOptions local_map;
@@ -53,9 +55,10 @@ struct TrackedFrame {
   double time = 0;  // [s]
   PoseSource source = PoseSource::kNone;
   Prediction prediction = Prediction::kNone;
-  Rigid3d cam_from_world;      // as known at this moment
-  KeyframeId reference;        // invalid for the frame that starts the map
-  Rigid3d cam_from_reference;  // through which the frame follows later corrections
+  Rigid3d cam_from_world;       // as known at this moment
+  KeyframeId reference;         // invalid for the frame that starts the map
+  Rigid3d cam_from_reference;   // through which the frame follows later corrections
+  double disparity_offset = 0;  // [px] found in the rectification and removed
   int odometer_inliers = 0;
   int last_frame_inliers = 0;
   int inliers = 0;  // landmarks that agree with the final pose
@@ -81,6 +84,7 @@ class StereoTracker {
  private:
   void follow_map(const MapSnapshot& map);
   TrackedFrame initialize(Frame& frame) const;
+  void correct_disparities(Frame& frame) const;
   void predict(Frame& frame, TrackedFrame& result);
   bool track_last_frame(Frame& frame, const MapSnapshot& map, TrackedFrame& result) const;
   bool track_reference(Frame& frame, const MapSnapshot& map) const;
@@ -99,6 +103,7 @@ class StereoTracker {
   Camera camera_;
   StereoTrackerOptions options_;
   StereoOdometer odometer_;
+  DisparityCalibrator disparity_;
   TrackRefiner refiner_;
 
   std::optional<Frame> last_;  // the previous frame, tracked or not

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <string>
+
+#include "cameras/camera.h"
+#include "frontend/odometry/stereo_odometer.h"
+
+namespace hybrid_slam {
+
+struct DisparityCalibratorOptions {
+  bool enabled = true;
+  double prior_sigma = 0.2;       // [px] of the offset, before anything was seen
+  double min_significance = 3.0;  // standard deviations from 0 before the offset is used
+  int min_matches = 50;           // in a pair of frames
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
+};
+
+// A rectified pair is never perfectly rectified: a small turn of one camera about its vertical axis
+// shifts all disparities by nearly the same offset, and with them the scale of every motion. The
+// offset shows when the cameras move: near and far points, and both moments, must tell of one
+// motion. This estimator adds up what the odometer's matches say of it, pair by pair: Gauss-Newton
+// in the motion and the offset (u_right measured = u_right true + offset), the motion eliminated,
+// the noise taken from the residuals themselves.
+class DisparityCalibrator {
+ public:
+  DisparityCalibrator(const Calibrated<RectifiedStereo>& camera,
+                      const DisparityCalibratorOptions& options);
+
+  // The inliers of a motion. `*_correction` [px]: what was already subtracted from u_right.
+  void add(const StereoFeatures& previous, double previous_correction,
+           const StereoFeatures& current, double current_correction, const StereoMotion& motion);
+
+  double offset() const;  // [px]; 0 as long as it is not significant
+  double sigma() const;   // standard deviation of the estimate [px]
+
+ private:
+  double estimate() const { return weighted_sum_ / information_; }
+
+  Calibrated<RectifiedStereo> camera_;
+  DisparityCalibratorOptions options_;
+  double information_ = 0;   // [1 / px^2]
+  double weighted_sum_ = 0;  // information x offset
+};
+
+}  // namespace hybrid_slam
