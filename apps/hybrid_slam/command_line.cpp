@@ -1,5 +1,7 @@
 #include "apps/hybrid_slam/command_line.h"
 
+#include <spdlog/spdlog.h>
+
 #include <CLI/CLI.hpp>
 #include <map>
 
@@ -17,6 +19,24 @@ constexpr const char* kFooter = R"(Writes to DIR:
 
 Exit codes: 0 done; 1 internal error; 2 bad usage; 3 bad input (dataset, configuration or output
 folder); 4 no frame could be tracked; 130 interrupted, what there was is saved.)";
+
+// A check of an option's text, with what to say of one that fails.
+CLI::Validator must_be(bool (*check)(const std::string&), const std::string& complaint) {
+  return {[=](const std::string& text) {
+            return check(text) ? std::string() : '"' + text + "\" " + complaint;
+          },
+          ""};
+}
+
+// CLI's own checks let NaN pass, and its conversion wraps negative numbers.
+bool is_rate(const std::string& text) {
+  double rate = 0;
+  return CLI::detail::lexical_cast(text, rate) && rate >= 0.001 && rate <= 1e5;
+}
+
+bool is_count(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+}
 
 }  // namespace
 
@@ -42,7 +62,9 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--sequence", line.sequence, "sequence of the dataset; the only one if not given");
   app.add_option("--config", config, "YAML file with options");
   app.add_option("--out", line.out, "folder for the results, made if missing")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(must_be([](const std::string& folder) { return !folder.empty(); },
+                      "is no name of a folder"));
   app.add_option(
          "--mode", line.mode,
          "every-frame (default: each frame is mapped before the next, repeatable) or realtime")
@@ -50,16 +72,18 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       ->option_text("MODE");
   app.add_option("--rate", line.rate,
                  "realtime: images per second; those that come too early are dropped and counted")
-      ->check(CLI::PositiveNumber.description(""));
+      ->check(must_be(is_rate, "is no rate between 0.001 and 100000 Hz"));
   app.add_option("--cameras", cameras, "stereo (hybrid: not in this version)")
       ->check(CLI::IsMember({"stereo", "hybrid"}).description(""))
       ->option_text("WHICH");
   app.add_option("--features", features, "features per image (default 2000)")
       ->check(CLI::Range(50, 100000).description(""));
-  app.add_option("--seed", seed, "of every random choice (default 0)");
+  app.add_option("--seed", seed, "of every random choice (default 0)")
+      ->check(must_be(is_count, "is no number from 0"));
   app.add_option("--threads", line.threads, "that extract features (default: one per core)")
       ->check(CLI::Range(1, 256).description(""));
-  app.add_option("--limit", line.limit, "process so many frames at most");
+  app.add_option("--limit", line.limit, "process so many frames at most")
+      ->check(CLI::PositiveNumber.description(""));
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
   try {
     app.parse(argc, argv);
@@ -70,7 +94,12 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       throw CLI::ValidationError("--cameras hybrid is not in this version");
     }
   } catch (const CLI::ParseError& error) {
-    exit_code = app.exit(error) == 0 ? kExitOk : kExitBadUsage;
+    if (error.get_exit_code() == 0) {  // --help
+      exit_code = app.exit(error);
+    } else {
+      spdlog::error("{} (--help tells more)", error.what());
+      exit_code = kExitBadUsage;
+    }
     return std::nullopt;
   }
   if (!config.empty()) {

@@ -109,6 +109,8 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   json["interrupted"] = result.cancelled;
   json["seconds"] = summary.seconds;
   json["ate"] = summary.ate ? to_json(*summary.ate) : Json();
+  json["truth_convention"] =
+      sequence.truth_convention.empty() ? Json() : Json(sequence.truth_convention);
   json["options"] = options_json(line);
   json["seed"] = line.options.seed;
   json["blas"] = blas_name();

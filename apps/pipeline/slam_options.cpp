@@ -2,8 +2,11 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
+#include <filesystem>
 #include <functional>
 #include <map>
+#include <type_traits>
 
 #include "cameras/input_error.h"
 
@@ -16,7 +19,8 @@ class Section {
   Section(const std::string& path, const std::string& name, const YAML::Node& node)
       : path_(path), name_(name), node_(node) {
     if (node && !node.IsNull() && !node.IsMap()) {
-      fail(node, name_ + " must hold keys and values");
+      fail(node, (name.empty() ? "the file" : name.substr(0, name.size() - 1)) +
+                     " must hold keys and values");
     }
   }
 
@@ -28,6 +32,9 @@ class Section {
         value = node_[key].as<T>();
       } catch (const YAML::Exception&) {
         fail(node_[key], name_ + key + " has a value of the wrong type");
+      }
+      if constexpr (std::is_floating_point_v<T>) {
+        if (!std::isfinite(value)) fail(node_[key], name_ + key + " must be finite");
       }
     }
     return *this;
@@ -43,6 +50,7 @@ class Section {
       return;
     }
     for (const auto& entry : node_) {
+      if (!entry.first.IsScalar()) fail(entry.first, "a key must be a word");
       const auto key = entry.first.as<std::string>();
       if (!known_.contains(key)) {
         fail(entry.first, "unknown key " + name_ + key);
@@ -203,6 +211,8 @@ std::string SlamOptions::validate() const {
 }
 
 SlamOptions read_slam_options(const std::string& path) {
+  std::error_code ignored;  // a folder opens like a file and reads as an empty one
+  if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": cannot be read");
   YAML::Node root;
   try {
     root = YAML::LoadFile(path);
