@@ -218,24 +218,32 @@ TEST_CASE("an interrupted run saves what there is") {
   const TempFolder folder;
   constexpr int kFrames = 200;
   write_kitti_survey(folder.path() / "data", kFrames);
-  // Its warning tells that the frames before have been tracked.
-  write_text(kitti_image(folder.path() / "data", true, 4), "no image");
   std::vector<std::string> more;
+  int last_damaged = 4;
+  int min_tracked = 4;
   SECTION("every-frame") { more = {"--mode", "every-frame"}; }
   SECTION("realtime") { more = {"--mode", "realtime"}; }
-  SECTION("realtime, waiting for the next image") { more = {"--mode", "realtime", "--rate", "10"}; }
+  SECTION("realtime, waiting for the next image") {
+    more = {"--mode", "realtime", "--rate", "5"};
+    last_damaged = 60;  // on a busy machine, those that come first are dropped
+    min_tracked = 1;
+  }
+  // The warning about a damaged image tells that the frames before it have been tracked.
+  for (int i = 4; i <= last_damaged; ++i) {
+    write_text(kitti_image(folder.path() / "data", true, i), "no image");
+  }
   for (const int signal : {SIGINT, SIGTERM}) {
     ChildProcess program(HYBRID_SLAM, slam_arguments("data", more), folder.path());
-    REQUIRE(program.wait_for_error_text("neither PNG nor JPEG", std::chrono::seconds(30)));
+    REQUIRE(program.wait_for_error_text("neither PNG nor JPEG", std::chrono::seconds(60)));
     program.send(signal);
-    const Outcome outcome = program.finish(std::chrono::seconds(15));
+    const Outcome outcome = program.finish(std::chrono::seconds(60));
     INFO(outcome.err);
     CHECK(outcome.signal == 0);
     CHECK(outcome.code == 130);
     CHECK(count_lines(outcome.err, "interrupted: results up to frame") == 1);
     const Json summary = check_results(folder.path() / "out");
     CHECK(summary["interrupted"] == true);
-    CHECK(summary["frames"]["tracked"].get<int>() >= 4);
+    CHECK(summary["frames"]["tracked"].get<int>() >= min_tracked);
     CHECK(summary["frames"]["read"].get<int>() < kFrames);
     fs::remove_all(folder.path() / "out");
   }

@@ -92,7 +92,7 @@ Outcome ChildProcess::finish(std::chrono::seconds limit) {
 
 Outcome run_program(const std::string& program, const std::vector<std::string>& arguments,
                     const std::filesystem::path& folder) {
-  return ChildProcess(program, arguments, folder).finish(std::chrono::seconds(60));
+  return ChildProcess(program, arguments, folder).finish(std::chrono::seconds(120));
 }
 
 }  // namespace hybrid_slam

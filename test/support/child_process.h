@@ -43,7 +43,7 @@ class ChildProcess {
   bool ended_ = false;
 };
 
-// Starts a program and waits for it, a minute at most.
+// Starts a program and waits for it, two minutes at most.
 Outcome run_program(const std::string& program, const std::vector<std::string>& arguments,
                     const std::filesystem::path& folder);
 
