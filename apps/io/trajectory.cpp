@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Geometry>
+#include "frontend/pose/rigid_alignment.h"
 
 namespace hybrid_slam {
 
 namespace {
-
-constexpr std::size_t kMinPairsToAlign = 3;
 
 // Index of the pose nearest in time. `poses` is not empty.
 std::size_t nearest(std::span<const StampedPose> poses, double time) {
@@ -21,25 +19,20 @@ std::size_t nearest(std::span<const StampedPose> poses, double time) {
   return time - poses[index - 1].time <= poses[index].time - time ? index - 1 : index;
 }
 
-// Eigen's Umeyama, since it also serves a straight path: its rotation about itself is free, but the
-// error is not.
 std::optional<Sim3d> align(std::span<const PosePair> pairs, TrajectoryAlignment alignment) {
   if (alignment == TrajectoryAlignment::kNone) return Sim3d();
-  if (pairs.size() < kMinPairsToAlign) return std::nullopt;
-  Eigen::Matrix3Xd estimate(3, static_cast<Eigen::Index>(pairs.size()));
-  Eigen::Matrix3Xd truth(3, estimate.cols());
-  for (Eigen::Index i = 0; i < estimate.cols(); ++i) {
-    estimate.col(i) = pairs[static_cast<std::size_t>(i)].estimate.translation();
-    truth.col(i) = pairs[static_cast<std::size_t>(i)].truth.translation();
+  std::vector<Eigen::Vector3d> estimate, truth;
+  for (const PosePair& pair : pairs) {
+    estimate.emplace_back(pair.estimate.translation());
+    truth.emplace_back(pair.truth.translation());
   }
-  const bool with_scale = alignment == TrajectoryAlignment::kSim3;
-  if (with_scale && (estimate.colwise() - estimate.col(0)).isZero(0)) return std::nullopt;
-  const Eigen::Matrix4d transform = Eigen::umeyama(estimate, truth, with_scale);
-  const Eigen::Matrix3d scaled_rotation = transform.topLeftCorner<3, 3>();
-  const double scale = with_scale ? std::cbrt(scaled_rotation.determinant()) : 1;
-  if (!(scale > 0) || !transform.allFinite()) return std::nullopt;
-  return Sim3d(Eigen::Quaterniond(Eigen::Matrix3d(scaled_rotation / scale)),
-               Eigen::Vector3d(transform.topRightCorner<3, 1>()), scale);
+  if (alignment == TrajectoryAlignment::kSim3) {
+    const auto same = [&](const Eigen::Vector3d& position) { return position == estimate[0]; };
+    if (std::all_of(estimate.begin(), estimate.end(), same)) return std::nullopt;  // no scale
+    return align_similarity(estimate, truth, CollinearPoints::kAlign);
+  }
+  const auto rigid = align_rigid(estimate, truth, CollinearPoints::kAlign);
+  return rigid ? std::optional(Sim3d(*rigid)) : std::nullopt;
 }
 
 }  // namespace

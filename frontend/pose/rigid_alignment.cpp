@@ -41,7 +41,7 @@ struct Alignment {
 };
 
 std::optional<Alignment> align(std::span<const Eigen::Vector3d> a,
-                               std::span<const Eigen::Vector3d> b) {
+                               std::span<const Eigen::Vector3d> b, CollinearPoints collinear) {
   if (a.size() != b.size()) throw std::invalid_argument("align: unequal numbers of points");
   if (a.size() < 3) return std::nullopt;
   const Moments m = moments(a, b);
@@ -49,7 +49,8 @@ std::optional<Alignment> align(std::span<const Eigen::Vector3d> a,
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m.covariance,
                                               Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d& singular = svd.singularValues();
-  if (!(singular[1] > kCollinear * singular[0])) return std::nullopt;
+  const bool on_line = !(singular[1] > kCollinear * singular[0]);
+  if (on_line && collinear == CollinearPoints::kRefuse) return std::nullopt;
   Eigen::Vector3d signs(1, 1, 1);
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs[2] = -1;
   const Eigen::Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
@@ -60,15 +61,17 @@ std::optional<Alignment> align(std::span<const Eigen::Vector3d> a,
 }  // namespace
 
 std::optional<Rigid3d> align_rigid(std::span<const Eigen::Vector3d> points_in_a,
-                                   std::span<const Eigen::Vector3d> points_in_b) {
-  const std::optional<Alignment> found = align(points_in_a, points_in_b);
+                                   std::span<const Eigen::Vector3d> points_in_b,
+                                   CollinearPoints collinear) {
+  const std::optional<Alignment> found = align(points_in_a, points_in_b, collinear);
   if (!found) return std::nullopt;
   return Rigid3d(found->rotation, found->mean_b - found->rotation * found->mean_a);
 }
 
 std::optional<Sim3d> align_similarity(std::span<const Eigen::Vector3d> points_in_a,
-                                      std::span<const Eigen::Vector3d> points_in_b) {
-  const std::optional<Alignment> found = align(points_in_a, points_in_b);
+                                      std::span<const Eigen::Vector3d> points_in_b,
+                                      CollinearPoints collinear) {
+  const std::optional<Alignment> found = align(points_in_a, points_in_b, collinear);
   if (!found || !(found->scale > 0)) return std::nullopt;
   const Eigen::Vector3d translation =
       found->mean_b - found->scale * (found->rotation * found->mean_a);

@@ -10,14 +10,20 @@
 
 namespace hybrid_slam {
 
-// The transform b_from_a that minimises the sum of |b_from_a * points_in_a[i] - points_in_b[i]|^2,
-// in closed form (Umeyama, PAMI 1991). None if the rotation is not determined: fewer than three
-// points, all points on one line, or values that are not finite. Both spans have the same size.
-std::optional<Rigid3d> align_rigid(std::span<const Eigen::Vector3d> points_in_a,
-                                   std::span<const Eigen::Vector3d> points_in_b);
+// Points on one line leave the rotation about it open. A pose needs it; the error of a straight
+// path does not.
+enum class CollinearPoints { kRefuse, kAlign };
 
-// The same with a scale.
+// The transform b_from_a that minimises the sum of |b_from_a * points_in_a[i] - points_in_b[i]|^2,
+// in closed form (Umeyama, PAMI 1991). None for fewer than three points, values that are not finite
+// and, if refused, points on one line. Both spans have the same size.
+std::optional<Rigid3d> align_rigid(std::span<const Eigen::Vector3d> points_in_a,
+                                   std::span<const Eigen::Vector3d> points_in_b,
+                                   CollinearPoints collinear = CollinearPoints::kRefuse);
+
+// The same with a scale, which must come out positive.
 std::optional<Sim3d> align_similarity(std::span<const Eigen::Vector3d> points_in_a,
-                                      std::span<const Eigen::Vector3d> points_in_b);
+                                      std::span<const Eigen::Vector3d> points_in_b,
+                                      CollinearPoints collinear = CollinearPoints::kRefuse);
 
 }  // namespace hybrid_slam

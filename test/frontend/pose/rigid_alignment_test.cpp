@@ -110,6 +110,23 @@ TEST_CASE("alignment works far from the origin and along a path that is nearly s
   for (const Eigen::Vector3d& p : a) CHECK((*found * p - truth * p).norm() < 1e-6);
 }
 
+TEST_CASE("points on a line are aligned where that is asked for", "[pose]") {
+  Random random(8);
+  Points line;
+  for (int i = 0; i < 20; ++i) line.push_back(0.3 * i * Eigen::Vector3d(1, -2, 0.5));
+  const Rigid3d rigid = random.rigid(50, 3.14);
+  const auto found = align_rigid(line, moved_by(rigid, line), CollinearPoints::kAlign);
+  REQUIRE(found);
+  const Sim3d similar(rigid.rotation(), rigid.translation(), 2.5);
+  const auto scaled = align_similarity(line, moved_by(similar, line), CollinearPoints::kAlign);
+  REQUIRE(scaled);
+  CHECK(scaled->scale() == Approx(2.5));
+  for (const Eigen::Vector3d& p : line) {
+    CHECK((*found * p - rigid * p).norm() < 1e-9);
+    CHECK((*scaled * p - similar * p).norm() < 1e-9);
+  }
+}
+
 TEST_CASE("alignment refuses what leaves the rotation open", "[pose]") {
   const Points line = {{0, 0, 0}, {1, 2, 3}, {2, 4, 6}, {-5, -10, -15}};
   CHECK_FALSE(align_rigid(line, line));
