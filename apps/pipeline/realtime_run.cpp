@@ -32,16 +32,15 @@ class MappingWorker {
 
   bool has_room() const { return jobs_.size() < kMappingBacklog; }
 
-  // A keyframe is worth more than the last iterations of the one before: its adjustment is cut
-  // short.
-  // False if the worker has failed: see rethrow().
+  // A keyframe is worth more than the last iterations of the one before: that one's adjustment is
+  // cut short, before the new one is queued, so that it cannot be the one that is stopped. False if
+  // the worker has failed: see rethrow().
   bool add(MappingJob job) {
-    if (!jobs_.push(std::move(job))) {
-      return false;
+    {
+      const std::lock_guard lock(mutex_);
+      current_.request_stop();
     }
-    const std::lock_guard lock(mutex_);
-    current_.request_stop();
-    return true;
+    return jobs_.push(std::move(job));
   }
 
   std::shared_ptr<const MapSnapshot> snapshot() const { return snapshots_.get(); }
@@ -50,7 +49,7 @@ class MappingWorker {
   void wait_for_map(std::size_t version) const { snapshots_.wait_beyond(version); }
   std::size_t version() const { return snapshots_.version(); }
 
-  // What is queued is still mapped. Then rethrows what the thread threw, once.
+  // What is queued is still mapped.
   void finish() {
     jobs_.close();
     if (thread_.joinable()) {
@@ -58,6 +57,7 @@ class MappingWorker {
     }
   }
 
+  // After finish(): what the thread threw, if it did.
   void rethrow() const {
     if (failure_) {
       std::rethrow_exception(failure_);

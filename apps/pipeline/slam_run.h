@@ -18,8 +18,8 @@ namespace hybrid_slam {
 struct RunOptions {
   int threads = 1;        // that read images and extract features; no result depends on it
   std::size_t limit = 0;  // frames to process at most; 0: all
-  double rate =
-      0;  // realtime: images per second, dropped when the pipeline is behind; 0: they wait
+  // Realtime: images per second, dropped when the pipeline is behind; 0: they wait for it.
+  double rate = 0;
 };
 
 struct FrameCounts {
