@@ -15,7 +15,7 @@ void Recorder::corrupt(const std::string& reason) {
   if (hooks_.warning) {
     hooks_.warning(reason);
   }
-  report(nullptr);
+  report();
 }
 
 void Recorder::tracked(const TrackedFrame& frame, const MapSnapshot& map) {
@@ -26,7 +26,9 @@ void Recorder::tracked(const TrackedFrame& frame, const MapSnapshot& map) {
   record.frame.keyframe.reset();
   record.frame.counts = {};
   result_.records.push_back(std::move(record));
-  report(&map);
+  progress_.keyframes = map.keyframe_count();
+  progress_.landmarks = map.landmark_count();
+  report();
 }
 
 void Recorder::became_keyframe(std::int64_t frame_index, KeyframeId id) {
@@ -38,19 +40,13 @@ bool Recorder::cancelled() {
   return result_.cancelled;
 }
 
-void Recorder::report(const MapSnapshot* map) {
+void Recorder::report() {
   if (!hooks_.progress) {
     return;
   }
-  RunProgress progress;
-  progress.frames = result_.frames;
-  progress.done = static_cast<std::size_t>(result_.frames.read + result_.frames.dropped);
-  progress.total = total_;
-  if (map != nullptr) {
-    progress.keyframes = map->keyframe_count();
-    progress.landmarks = map->landmark_count();
-  }
-  hooks_.progress(progress);
+  progress_.frames = result_.frames;
+  progress_.done = static_cast<std::size_t>(result_.frames.read + result_.frames.dropped);
+  hooks_.progress(progress_);
 }
 
 }  // namespace hybrid_slam

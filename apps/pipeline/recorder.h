@@ -11,7 +11,9 @@ namespace hybrid_slam {
 class Recorder {
  public:
   Recorder(RunResult& result, const RunHooks& hooks, std::size_t total)
-      : result_(result), hooks_(hooks), total_(total) {}
+      : result_(result), hooks_(hooks) {
+    progress_.total = total;
+  }
 
   void corrupt(const std::string& reason);
   void dropped(int count) { result_.frames.dropped += count; }
@@ -20,11 +22,11 @@ class Recorder {
   bool cancelled();
 
  private:
-  void report(const MapSnapshot* map);
+  void report();
 
   RunResult& result_;
   const RunHooks& hooks_;
-  std::size_t total_;
+  RunProgress progress_;
   std::map<std::int64_t, std::size_t> record_of_frame_;
 };
 

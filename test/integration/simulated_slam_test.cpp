@@ -102,11 +102,15 @@ TEST_CASE("Unreadable frames are counted and tracking goes on", "[integration]")
   std::vector<std::string> warnings;
   RunHooks hooks;
   hooks.warning = [&](const std::string& line) { warnings.push_back(line); };
+  RunProgress last;
+  hooks.progress = [&](const RunProgress& progress) { last = progress; };
   const RunResult result = run_every_frame(source, slam_options(), {}, hooks);
   CHECK(result.frames.read == 60);
   CHECK(result.frames.corrupt == 4);
   CHECK(result.frames.tracked == 56);
   CHECK(warnings.size() == 4);
+  CHECK(last.done == 60);
+  CHECK(last.keyframes > 0);  // though the last frame is a corrupt one
 }
 
 TEST_CASE("After blank frames the camera is found again in the map", "[integration]") {
