@@ -24,6 +24,11 @@ constexpr float kScaleOfGrowth = 4.0F;
 // Below this OpenCV has no octave to search.
 constexpr int kMinImageSize = 12;
 
+// OpenCV's setting is global: set once, before the first extractor of any thread is used.
+void single_threaded_opencv() {
+  [[maybe_unused]] static const bool kDone = (cv::setNumThreads(1), true);
+}
+
 int octave_of(const cv::KeyPoint& keypoint) {
   const int octave = keypoint.octave & 255;
   return octave < 128 ? octave : octave - 256;
@@ -50,7 +55,7 @@ class OpenCvSift final : public SiftExtractor {
         sift_(cv::SIFT::create(0, options.octave_layers,
                                options.contrast_threshold * options.octave_layers / 255.0,
                                options.edge_threshold, options.initial_sigma)) {
-    cv::setNumThreads(1);
+    single_threaded_opencv();
   }
 
   FeatureSet extract(const GrayImage& image, const GrayImage* mask) override {
