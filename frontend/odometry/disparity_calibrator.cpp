@@ -14,71 +14,99 @@ namespace hybrid_slam {
 namespace {
 
 constexpr double kMedianChi2 = 2.366;   // of 3 degrees of freedom
+constexpr double kShareOfPair = 0.5;    // each frame, and its noise, is in two pairs
 constexpr double kOutlierChi2 = 7.815;  // 95 %, 3 degrees of freedom
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using Matrix7d = Eigen::Matrix<double, 7, 7>;
+using Matrix73d = Eigen::Matrix<double, 7, 3>;
 
-// One match, linearised: the residual in the current frame with the noise of both frames.
-struct Linearized {
-  Eigen::Vector3d residual;                             // predicted - measured (u, v, u_right)
-  Eigen::Matrix<double, 3, 6, Eigen::RowMajor> motion;  // d residual / d motion
-  Eigen::Vector3d offset;                               // d residual / d offset
-  Eigen::Matrix3d weight;                               // inverse covariance
-  double chi2 = 0;
+// What one match says of the motion (first six) and the offset (last), its point eliminated.
+struct Contribution {
+  Matrix7d information = Matrix7d::Zero();
+  Vector7d gradient = Vector7d::Zero();
+  double chi2 = 0;  // 3 degrees of freedom
 };
 
-class PairLinearizer {
+// A point seen in both frames: six residuals (u, v, u_right twice), minimised over the point first.
+// Linearising there, and not at the noisy measurement, keeps weights and noise independent: else
+// the offset is biased wherever the noise is large.
+class TwoFramePoint {
  public:
-  PairLinearizer(const Calibrated<RectifiedStereo>& camera, const Rigid3d& current_from_previous)
-      : camera_(camera), motion_(current_from_previous) {}
+  TwoFramePoint(const Calibrated<RectifiedStereo>& camera, const Rigid3d& current_from_previous,
+                const Eigen::Vector3d& before, double sigma_before, const Eigen::Vector3d& now,
+                double sigma_now)
+      : camera_(camera),
+        motion_(current_from_previous),
+        measured_{before, now},
+        weight_{1 / (sigma_before * sigma_before), 1 / (sigma_now * sigma_now)} {}
 
-  std::optional<Linearized> operator()(const Eigen::Vector3d& before, double sigma_before,
-                                       const Eigen::Vector3d& now, double sigma_now) const {
-    const auto point = triangulate_stereo(camera_, before);
-    if (!point) return std::nullopt;
-    const double* params = camera_.params.data();
-    const Eigen::Vector3d moved = motion_ * *point;
-    Eigen::Vector3d predicted;
-    RowMatrix3d d_point;
-    if (!RectifiedStereo::project_with_jacobians(params, moved.data(), predicted.data(),
-                                                 d_point.data(), nullptr)) {
-      return std::nullopt;
+  std::optional<Contribution> eliminate() {
+    const auto start = triangulate_stereo(camera_, measured_[0]);
+    if (!start) return std::nullopt;
+    point_ = *start;
+    for (int i = 0; i < kPointIterations; ++i) {
+      if (!linearize()) return std::nullopt;
+      point_ -= point_information_.ldlt().solve(point_gradient_);
     }
-    const Eigen::Matrix3d d_before =
-        d_point * motion_.rotation().toRotationMatrix() * triangulation_jacobian(*point, before);
-    Linearized match;
-    match.residual = predicted - now;
-    match.motion = pose_jacobian<3>(d_point, moved);
-    match.offset = Eigen::Vector3d::UnitZ() - d_before.col(2);
-    const Eigen::Matrix3d covariance =
-        sigma_now * sigma_now * Eigen::Matrix3d::Identity() +
-        sigma_before * sigma_before * d_before * d_before.transpose();
-    match.weight = covariance.inverse();
-    match.chi2 = match.residual.dot(match.weight * match.residual);
-    return match;
+    if (!linearize()) return std::nullopt;
+    const Eigen::LLT<Eigen::Matrix3d> factor(point_information_);
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    Contribution reduced = all_;
+    reduced.information -= mixed_ * factor.solve(mixed_.transpose());
+    reduced.gradient -= mixed_ * factor.solve(point_gradient_);
+    return reduced;
   }
 
  private:
-  // d point / d (u_left, v, u_right).
-  Eigen::Matrix3d triangulation_jacobian(const Eigen::Vector3d& point,
-                                         const Eigen::Vector3d& measured) const {
-    const double disparity = measured[0] - measured[2];
-    Eigen::Matrix3d jacobian;
-    jacobian.col(0) = -point / disparity;
-    jacobian.col(1).setZero();
-    jacobian.col(2) = point / disparity;
-    jacobian(0, 0) += point.z() / camera_.params[0];
-    jacobian(1, 1) = point.z() / camera_.params[1];
-    return jacobian;
+  static constexpr int kPointIterations = 3;
+
+  // Residuals and derivatives at the present point; false if a camera does not see it.
+  bool linearize() {
+    all_ = {};
+    mixed_.setZero();
+    point_information_.setZero();
+    point_gradient_.setZero();
+    for (int frame = 0; frame < 2; ++frame) {
+      const Eigen::Vector3d in_cam = frame == 0 ? point_ : motion_ * point_;
+      Eigen::Vector3d predicted;
+      RowMatrix3d d_point;
+      if (!RectifiedStereo::project_with_jacobians(camera_.params.data(), in_cam.data(),
+                                                   predicted.data(), d_point.data(), nullptr)) {
+        return false;
+      }
+      Eigen::Matrix<double, 3, 7> d_unknowns = Eigen::Matrix<double, 3, 7>::Zero();
+      if (frame == 1) d_unknowns.leftCols<6>() = pose_jacobian<3>(d_point, in_cam);
+      d_unknowns(2, 6) = 1;  // u_right without the offset is smaller
+      const Eigen::Matrix3d d_world =
+          frame == 0 ? Eigen::Matrix3d(d_point)
+                     : Eigen::Matrix3d(d_point * motion_.rotation().toRotationMatrix());
+      const Eigen::Vector3d residual = predicted - measured_[frame];
+      const double weight = weight_[frame];
+      all_.information += weight * d_unknowns.transpose() * d_unknowns;
+      all_.gradient += weight * d_unknowns.transpose() * residual;
+      all_.chi2 += weight * residual.squaredNorm();
+      mixed_ += weight * d_unknowns.transpose() * d_world;
+      point_information_ += weight * d_world.transpose() * d_world;
+      point_gradient_ += weight * d_world.transpose() * residual;
+    }
+    return true;
   }
 
   const Calibrated<RectifiedStereo>& camera_;
   const Rigid3d& motion_;
+  Eigen::Vector3d measured_[2];
+  double weight_[2];
+  Eigen::Vector3d point_;
+  Contribution all_;
+  Matrix73d mixed_;
+  Eigen::Matrix3d point_information_;
+  Eigen::Vector3d point_gradient_;
 };
 
-double median_chi2(const std::vector<Linearized>& matches) {
+double median_chi2(const std::vector<Contribution>& matches) {
   std::vector<double> chi2;
-  for (const Linearized& match : matches) chi2.push_back(match.chi2);
+  for (const Contribution& match : matches) chi2.push_back(match.chi2);
   const auto middle = chi2.begin() + static_cast<long>(chi2.size() / 2);
   std::nth_element(chi2.begin(), middle, chi2.end());
   return *middle;
@@ -90,27 +118,22 @@ struct OffsetStep {
 };
 
 // The step of the offset with the motion eliminated; none where the motion is not determined.
-std::optional<OffsetStep> eliminate_motion(const std::vector<Linearized>& matches,
+// `variance`: that of a whitened residual.
+std::optional<OffsetStep> eliminate_motion(const std::vector<Contribution>& matches,
                                            double variance) {
-  Matrix6d motion = Matrix6d::Zero();
-  Vector6d mixed = Vector6d::Zero();
-  Vector6d motion_gradient = Vector6d::Zero();
-  double offset = 0;
-  double offset_gradient = 0;
-  for (const Linearized& match : matches) {
+  Contribution sum;
+  for (const Contribution& match : matches) {
     if (match.chi2 > kOutlierChi2 * variance) continue;
-    const Eigen::Matrix3d weight = match.weight / variance;
-    motion += match.motion.transpose() * weight * match.motion;
-    mixed += match.motion.transpose() * weight * match.offset;
-    motion_gradient += match.motion.transpose() * weight * match.residual;
-    offset += match.offset.dot(weight * match.offset);
-    offset_gradient += match.offset.dot(weight * match.residual);
+    sum.information += match.information / variance;
+    sum.gradient += match.gradient / variance;
   }
-  const Eigen::LLT<Matrix6d> factor(motion);
-  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::LLT<Matrix6d> motion(sum.information.topLeftCorner<6, 6>());
+  if (motion.info() != Eigen::Success) return std::nullopt;
+  const Vector6d mixed = sum.information.topRightCorner<6, 1>();
   OffsetStep result;
-  result.information = offset - mixed.dot(factor.solve(mixed));
-  result.step = -(offset_gradient - mixed.dot(factor.solve(motion_gradient))) / result.information;
+  result.information = sum.information(6, 6) - mixed.dot(motion.solve(mixed));
+  result.step =
+      -(sum.gradient[6] - mixed.dot(motion.solve(sum.gradient.head<6>()))) / result.information;
   if (!(result.information > 0) || !std::isfinite(result.step)) return std::nullopt;
   return result;
 }
@@ -142,21 +165,23 @@ void DisparityCalibrator::add(const StereoFeatures& previous, double previous_co
     const Keypoint& left = features.left.keypoints[i];
     return Eigen::Vector3d(left.x, left.y, features.u_right[i] + correction - at);
   };
-  const PairLinearizer linearize(camera_, motion.current_from_previous);
-  std::vector<Linearized> matches;
+  std::vector<Contribution> matches;
   for (const CircularMatch& match : motion.inliers) {
-    const auto linearized =
-        linearize(measurement(previous, match.previous, previous_correction),
-                  previous.left.keypoints[static_cast<std::size_t>(match.previous)].sigma,
-                  measurement(current, match.current, current_correction),
-                  current.left.keypoints[static_cast<std::size_t>(match.current)].sigma);
-    if (linearized) matches.push_back(*linearized);
+    const auto contribution =
+        TwoFramePoint(camera_, motion.current_from_previous,
+                      measurement(previous, match.previous, previous_correction),
+                      previous.left.keypoints[static_cast<std::size_t>(match.previous)].sigma,
+                      measurement(current, match.current, current_correction),
+                      current.left.keypoints[static_cast<std::size_t>(match.current)].sigma)
+            .eliminate();
+    if (contribution) matches.push_back(*contribution);
   }
   if (static_cast<int>(matches.size()) < options_.min_matches) return;
   const auto step = eliminate_motion(matches, median_chi2(matches) / kMedianChi2);
   if (step) {
-    information_ += step->information;
-    weighted_sum_ += step->information * (at + step->step);
+    const double information = step->information * kShareOfPair;
+    information_ += information;
+    weighted_sum_ += information * (at + step->step);
   }
 }
 

@@ -9,6 +9,8 @@
 namespace hybrid_slam {
 namespace {
 
+constexpr double kOrbitLength = 2 * 3.14159 * 3;  // [m]
+
 SyntheticSceneOptions orbit(int times) {
   SyntheticSceneOptions options;
   options.trajectory = SceneTrajectory::kOrbit;
@@ -58,7 +60,7 @@ TEST_CASE("A simulated orbit is tracked to the truth", "[integration]") {
   CHECK(result.frames.read == 60);
   CHECK(result.frames.tracked == 60);
   CHECK(result.map->keyframe_count() > 5);
-  CHECK(position_error(result, source.scene()) < 0.01);
+  CHECK(position_error(result, source.scene()) < 0.0025 * kOrbitLength);
   for (const FrameRecord& record : result.records) {
     CHECK(record.frame.source != PoseSource::kOdometer);
   }
@@ -142,7 +144,7 @@ TEST_CASE("realtime mode tracks the same scene and joins its threads", "[integra
   const RunResult result = run_realtime(source, slam_options(), run, {});
   CHECK(result.frames.read == 60);
   CHECK(result.frames.tracked >= 58);
-  CHECK(position_error(result, source.scene()) < 0.02);
+  CHECK(position_error(result, source.scene()) < 0.005 * kOrbitLength);
 }
 
 TEST_CASE("With a rate, images that come too early are dropped and counted", "[integration]") {
