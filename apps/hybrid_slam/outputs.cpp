@@ -106,6 +106,8 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
       count_by(result, [](const TrackedFrame& frame) { return to_string(frame.prediction); });
   json["keyframes"] = result.map->keyframe_count();
   json["landmarks"] = result.map->landmark_count();
+  json["disparity_offset_px"] =
+      result.records.empty() ? 0 : result.records.back().frame.disparity_offset;
   json["interrupted"] = result.cancelled;
   json["seconds"] = summary.seconds;
   json["ate"] = summary.ate ? to_json(*summary.ate) : Json();
