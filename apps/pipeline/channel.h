@@ -53,6 +53,12 @@ class Channel {
     return value;
   }
 
+  // Waits until nothing is queued, or the channel is closed.
+  void wait_empty() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return closed_ || queue_.empty(); });
+  }
+
   std::size_t size() const {
     const std::lock_guard lock(mutex_);
     return queue_.size();

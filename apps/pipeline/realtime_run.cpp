@@ -32,16 +32,19 @@ class MappingWorker {
 
   bool has_room() const { return jobs_.size() < kMappingBacklog; }
 
-  // A keyframe is worth more than the last iterations of the one before: that one's adjustment is
-  // cut short, before the new one is queued, so that it cannot be the one that is stopped. False if
-  // the worker has failed: see rethrow().
-  bool add(MappingJob job) {
-    {
-      const std::lock_guard lock(mutex_);
-      current_.request_stop();
-    }
-    return jobs_.push(std::move(job));
+  // False if the worker has failed: see rethrow().
+  bool add(MappingJob job) { return jobs_.push(std::move(job)); }
+
+  // Where time presses, a keyframe is worth more than the last iterations of the one before: its
+  // adjustment is cut short. Before the new one is added, so that it cannot be the one that is
+  // stopped.
+  void hurry() {
+    const std::lock_guard lock(mutex_);
+    current_.request_stop();
   }
+
+  // Until the worker has begun with the last keyframe it was given.
+  void wait_until_taken() { jobs_.wait_empty(); }
 
   std::shared_ptr<const MapSnapshot> snapshot() const { return snapshots_.get(); }
 
@@ -138,8 +141,10 @@ class PacedCamera {
   std::jthread thread_;
 };
 
-// Tracks in the calling thread until the images end or the run is cancelled.
-void track_all(OrderedLoader& loader, StereoTracker& tracker, MappingWorker& mapping,
+// Tracks in the calling thread until the images end or the run is cancelled. Images that come at
+// their own pace press for time; others wait for tracking, which waits for mapping, so that it is
+// never more than one keyframe ahead.
+void track_all(OrderedLoader& loader, StereoTracker& tracker, MappingWorker& mapping, bool paced,
                Recorder& recorder, StageTimes& times) {
   MapEdit counts;
   while (!recorder.cancelled()) {
@@ -151,6 +156,9 @@ void track_all(OrderedLoader& loader, StereoTracker& tracker, MappingWorker& map
       recorder.corrupt(loaded->error);
       continue;
     }
+    if (!paced) {
+      mapping.wait_until_taken();
+    }
     const auto map = mapping.snapshot();
     StageClock clock(times);
     TrackedFrame tracked = tracker.track(std::move(*loaded->frame), *map, mapping.has_room());
@@ -159,6 +167,9 @@ void track_all(OrderedLoader& loader, StereoTracker& tracker, MappingWorker& map
     recorder.tracked(tracked, *map);
     if (tracked.keyframe) {
       const std::size_t version = mapping.version();
+      if (paced) {
+        mapping.hurry();
+      }
       if (!mapping.add({std::move(*tracked.keyframe), std::exchange(counts, {})})) {
         break;
       }
@@ -192,7 +203,7 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
                          return next < total ? std::optional(next++) : std::nullopt;
                        });
   try {
-    track_all(loader, tracker, mapping, recorder, result.times);
+    track_all(loader, tracker, mapping, camera.has_value(), recorder, result.times);
   } catch (...) {
     if (camera) {
       camera->finish();  // a loader may be waiting for it

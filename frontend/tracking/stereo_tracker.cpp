@@ -30,11 +30,15 @@ void assign(const std::vector<ProjectionMatch>& matches, Frame& frame) {
 
 void clear(Frame& frame) { frame.landmarks.assign(frame.size(), LandmarkId()); }
 
-// Landmarks of a keyframe that enough others have seen to be relied on.
+// Landmarks of a keyframe that enough others have seen to be relied on; 0 if it has been culled.
 int well_founded(const MapSnapshot& map, KeyframeId id) {
+  const Keyframe* keyframe = map.find(id);
+  if (keyframe == nullptr) {
+    return 0;
+  }
   const std::size_t min_observations = map.keyframe_count() <= 2 ? 1 : 2;
   int count = 0;
-  for (const LandmarkId landmark : map.at(id).landmarks) {
+  for (const LandmarkId landmark : keyframe->landmarks) {
     const Landmark* found = landmark.valid() ? map.find(landmark) : nullptr;
     count += found != nullptr && found->observations.size() >= min_observations ? 1 : 0;
   }
@@ -47,12 +51,20 @@ std::string StereoTrackerOptions::validate() const {
   if (max_features < 1) {
     return "tracking: max_features must be positive";
   }
-  if (min_initial_share <= 0 || close_baselines <= 0 || last_frame_radius <= 0 ||
-      local_map_radius <= 0) {
-    return "tracking: shares, radii and close_baselines must be positive";
+  for (const double value :
+       {min_initial_share, close_baselines, last_frame_radius, local_map_radius}) {
+    if (!(value > 0)) {
+      return "tracking: min_initial_share, radii and close_baselines must be positive";
+    }
+  }
+  if (!(last_frame_retry_share >= 0) || !(last_frame_min_share >= 0) || min_new_points < 0 ||
+      min_reference_matches < 0 || min_pose_inliers < 6 || min_local_map_inliers < 6 ||
+      min_odometer_inliers < 6) {
+    return "tracking: shares and counts must not be negative, counts of inliers at least 6";
   }
   for (const std::string& error :
-       {odometer.validate(), disparity.validate(), keyframes.validate(), refinement.validate()}) {
+       {odometer.validate(), disparity.validate(), matcher.validate(), local_map.validate(),
+        relocalization.validate(), keyframes.validate(), refinement.validate()}) {
     if (!error.empty()) {
       return error;
     }
