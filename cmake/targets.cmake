@@ -27,15 +27,17 @@ function(hs_program name)
 endfunction()
 
 # hs_test(name SOURCES a_test.cpp ... DEPENDS ...): a Catch2 program whose cases become CTest tests.
-# Cases tagged [slow] get the label "slow", all others "ci". A case that needs the shared data and does
-# not find it prints "SKIPPED" and is reported as skipped.
+# Cases tagged [slow], in a program declared SLOW, get the label "slow", all others "ci". A case that
+# needs the shared data and does not find it prints "SKIPPED" and is reported as skipped.
 function(hs_test name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "SLOW" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS} hs_catch_main)
   set(skip SKIP_REGULAR_EXPRESSION "SKIPPED: ")
   catch_discover_tests(${name} TEST_SPEC "~[slow]" PROPERTIES LABELS ci ${skip} TIMEOUT 300)
-  catch_discover_tests(${name} TEST_SPEC "[slow]" TEST_SUFFIX " (slow)" PROPERTIES LABELS slow ${skip} TIMEOUT 3600)
+  if(ARG_SLOW)
+    catch_discover_tests(${name} TEST_SPEC "[slow]" TEST_SUFFIX " (slow)" PROPERTIES LABELS slow ${skip} TIMEOUT 3600)
+  endif()
 endfunction()
 
 # hs_benchmark(name_benchmark SOURCES ... DEPENDS ...): a google-benchmark program in bin/, built by

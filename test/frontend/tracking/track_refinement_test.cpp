@@ -73,7 +73,7 @@ struct Wall {
 
   Map map;
   CameraId camera_id;
-  Frame first{0, 0, {}, KeypointGrid({}, 1, 1), nullptr, {}, {}};
+  Frame first = make_frame(0, 0, {}, 1, 1);
   Frame second = first;
   std::vector<Keypoint> true_positions;
 };
