@@ -164,7 +164,7 @@ TEST_CASE("realtime mode drops and counts images that come too fast") {
   CHECK(frames["read"].get<int>() + frames["dropped"].get<int>() == 40);
 }
 
-TEST_CASE("--limit ends the run early") {
+TEST_CASE("A limit ends the run early") {
   const TempFolder folder;
   write_kitti_survey(folder.path() / "data");
   REQUIRE(run_slam(folder.path(), "data", {"--limit", "3"}).code == 0);
