@@ -17,8 +17,8 @@ constexpr int kMaxImageSize = 1 << 16;         // [px]
 // A part of a YAML file that knows where it stands, for messages.
 class Section {
  public:
-  Section(std::string file, std::string prefix, YAML::Node node)
-      : file_(std::move(file)), prefix_(std::move(prefix)), node_(std::move(node)) {}
+  Section(std::string file, std::string prefix, const YAML::Node& node)
+      : file_(std::move(file)), prefix_(std::move(prefix)), node_(node) {}
 
   [[noreturn]] void fail(const std::string& key, const std::string& reason) const {
     throw InputError(file_ + ": " + prefix_ + key + ": " + reason);
@@ -126,9 +126,9 @@ Section open_yaml(const std::string& path) {
     text.replace(0, end, end, ' ');
   }
   try {
-    YAML::Node root = YAML::Load(text);
+    const YAML::Node root = YAML::Load(text);
     if (!root.IsMap()) throw InputError(path + ": holds no keys and values");
-    return {path, "", std::move(root)};
+    return {path, "", root};
   } catch (const YAML::Exception& e) {
     throw InputError(path + ": line " + std::to_string(e.mark.line + 1) + ": " + e.msg);
   }

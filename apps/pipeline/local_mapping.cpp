@@ -1,5 +1,7 @@
 #include "apps/pipeline/local_mapping.h"
 
+#include <utility>
+
 #include "frontend/mapping/fusion.h"
 #include "frontend/mapping/triangulation.h"
 
@@ -25,7 +27,7 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   backend_.apply(fuse_with_neighbours(backend_.view(), id, options_.fusion));
   clock.lap("fuse");
   publish();
-  backend_.optimize_local(id, stop);
+  backend_.optimize_local(id, std::move(stop));
   clock.lap("local_bundle");
   backend_.apply(cull_keyframes(backend_.view(), id, options_.culling));
   clock.lap("cull_keyframes");

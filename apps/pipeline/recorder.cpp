@@ -45,7 +45,8 @@ void Recorder::report() {
     return;
   }
   progress_.frames = result_.frames;
-  progress_.done = static_cast<std::size_t>(result_.frames.read + result_.frames.dropped);
+  progress_.done = static_cast<std::size_t>(result_.frames.read) +
+                   static_cast<std::size_t>(result_.frames.dropped);
   hooks_.progress(progress_);
 }
 

@@ -35,10 +35,12 @@ std::vector<KeyframeId> outer_observers(const MapSnapshot& map,
   }
   for (const KeyframeId id : inner) counts.erase(id);
   std::vector<std::pair<int, KeyframeId>> ranked;
+  ranked.reserve(counts.size());
   for (const auto& [id, count] : counts) ranked.emplace_back(-count, id);
   std::sort(ranked.begin(), ranked.end());
   if (ranked.size() > limit) ranked.resize(limit);
   std::vector<KeyframeId> observers;
+  observers.reserve(ranked.size());
   for (const auto& [count, id] : ranked) observers.push_back(id);
   std::sort(observers.begin(), observers.end());
   return observers;
