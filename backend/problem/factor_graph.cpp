@@ -1,0 +1,96 @@
+#include "backend/problem/factor_graph.h"
+
+#include <cmath>
+#include <type_traits>
+#include <variant>
+
+#include <Eigen/Cholesky>
+
+namespace hybrid_slam {
+
+namespace {
+
+std::string fault(const char* what, std::size_t index, const char* reason) {
+  return std::string(what) + " " + std::to_string(index) + ": " + reason;
+}
+
+bool is_stereo(const Camera& camera) {
+  return std::holds_alternative<Calibrated<RectifiedStereo>>(camera);
+}
+
+// Null if all is well.
+const char* fault_of(const FactorGraph& graph, const GraphObservation& observation) {
+  if (observation.frame >= graph.frames.size()) return "no such frame";
+  if (observation.point >= graph.points.size()) return "no such point";
+  const std::uint32_t camera = graph.frames[observation.frame].camera;
+  if (camera >= graph.cameras.size()) return "its frame has no camera";
+  if (!observation.measurement.head<2>().allFinite()) return "measurement is not finite";
+  if (is_stereo(graph.cameras[camera].camera) && std::isinf(observation.measurement[2])) {
+    return "measurement is not finite";
+  }
+  if (!(observation.sigma > 0) || !std::isfinite(observation.sigma)) {
+    return "sigma must be positive and finite";
+  }
+  return nullptr;
+}
+
+const char* fault_of(const FactorGraph& graph, const GraphEdge& edge) {
+  constexpr double kTolerance = 1e-9;
+  if (edge.a >= graph.frames.size() || edge.b >= graph.frames.size()) return "no such frame";
+  if (edge.a == edge.b) return "joins a frame to itself";
+  if (!edge.a_from_b.params.allFinite()) return "measurement is not finite";
+  const Matrix6d& information = edge.information;
+  if (!information.allFinite() ||
+      (information - information.transpose()).norm() > kTolerance * information.norm()) {
+    return "information must be finite and symmetric";
+  }
+  if (Eigen::LLT<Matrix6d>(information).info() != Eigen::Success) {
+    return "information must be positive definite";
+  }
+  return nullptr;
+}
+
+const char* fault_of(const FactorGraph& graph, const GraphFrame& frame) {
+  if (!frame.cam_from_world.params.allFinite()) return "pose is not finite";
+  if (frame.camera != GraphFrame::kNoCamera && frame.camera >= graph.cameras.size()) {
+    return "no such camera";
+  }
+  return nullptr;
+}
+
+const char* fault_of(const FactorGraph&, const GraphCamera& camera) {
+  const bool finite = std::visit(
+      [](const auto& c) {
+        for (const double value : c.params) {
+          if (!std::isfinite(value)) return false;
+        }
+        return true;
+      },
+      camera.camera);
+  return finite ? nullptr : "parameters are not finite";
+}
+
+const char* fault_of(const FactorGraph&, const GraphPoint& point) {
+  return point.in_world.allFinite() ? nullptr : "position is not finite";
+}
+
+template <typename T>
+std::string first_fault(const FactorGraph& graph, const std::vector<T>& items, const char* what) {
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (const char* reason = fault_of(graph, items[i])) return fault(what, i, reason);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string FactorGraph::validate() const {
+  std::string wrong = first_fault(*this, cameras, "camera");
+  if (wrong.empty()) wrong = first_fault(*this, frames, "frame");
+  if (wrong.empty()) wrong = first_fault(*this, points, "point");
+  if (wrong.empty()) wrong = first_fault(*this, observations, "observation");
+  if (wrong.empty()) wrong = first_fault(*this, edges, "edge");
+  return wrong;
+}
+
+}  // namespace hybrid_slam
