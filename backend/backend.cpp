@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "backend/problem/problem_solver.h"
+#include "backend/problem/solve_bundle.h"
 
 namespace hybrid_slam {
 
@@ -39,6 +39,7 @@ BundleSummary Backend::optimize_full(std::stop_token stop) {
 
 BundleSummary Backend::optimize(const ProblemConfig& config, const std::stop_token& stop) {
   BundleResult result = solve_bundle(map_.view(), config, stop);
+  for (const auto& [id, camera] : result.cameras) map_.set_camera(id, camera);
   map_.move(result.cam_from_world, result.point_in_world);
   MapEdit edit;
   edit.erased_observations = std::move(result.outliers);

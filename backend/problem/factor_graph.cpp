@@ -34,20 +34,34 @@ const char* fault_of(const FactorGraph& graph, const GraphObservation& observati
   return nullptr;
 }
 
-const char* fault_of(const FactorGraph& graph, const GraphEdge& edge) {
+// An edge of either kind between `count` vertices.
+template <typename Edge>
+const char* edge_fault(const Edge& edge, std::size_t count) {
   constexpr double kTolerance = 1e-9;
-  if (edge.a >= graph.frames.size() || edge.b >= graph.frames.size()) return "no such frame";
+  if (edge.a >= count || edge.b >= count) return "no such frame";
   if (edge.a == edge.b) return "joins a frame to itself";
   if (!edge.a_from_b.params.allFinite()) return "measurement is not finite";
-  const Matrix6d& information = edge.information;
+  const auto& information = edge.information;
   if (!information.allFinite() ||
       (information - information.transpose()).norm() > kTolerance * information.norm()) {
     return "information must be finite and symmetric";
   }
-  if (Eigen::LLT<Matrix6d>(information).info() != Eigen::Success) {
-    return "information must be positive definite";
-  }
+  if (information.llt().info() != Eigen::Success) return "information must be positive definite";
   return nullptr;
+}
+
+const char* fault_of(const FactorGraph& graph, const GraphEdge& edge) {
+  return edge_fault(edge, graph.frames.size());
+}
+
+const char* fault_of(const FactorGraph& graph, const GraphSimilarityEdge& edge) {
+  const char* fault = edge_fault(edge, graph.similarities.size());
+  return fault == nullptr && !(edge.a_from_b.scale() > 0) ? "scale must be positive" : fault;
+}
+
+const char* fault_of(const FactorGraph&, const GraphSimilarity& similarity) {
+  if (!similarity.cam_from_world.params.allFinite()) return "pose is not finite";
+  return similarity.cam_from_world.scale() > 0 ? nullptr : "scale must be positive";
 }
 
 const char* fault_of(const FactorGraph& graph, const GraphFrame& frame) {
@@ -90,6 +104,8 @@ std::string FactorGraph::validate() const {
   if (wrong.empty()) wrong = first_fault(*this, points, "point");
   if (wrong.empty()) wrong = first_fault(*this, observations, "observation");
   if (wrong.empty()) wrong = first_fault(*this, edges, "edge");
+  if (wrong.empty()) wrong = first_fault(*this, similarities, "similarity");
+  if (wrong.empty()) wrong = first_fault(*this, similarity_edges, "similarity edge");
   return wrong;
 }
 

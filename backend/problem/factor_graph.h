@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cameras/camera.h"
-#include "cameras/geometry/rigid3d.h"
+#include "cameras/geometry/sim3d.h"
 
 namespace hybrid_slam {
 
@@ -49,6 +49,20 @@ struct GraphEdge {
   bool loop = false;                            // takes the edges' robust loss
 };
 
+// The same with scale, for maps whose scale may have drifted: factors/relative_similarity_factor.h.
+struct GraphSimilarity {
+  Sim3d cam_from_world;
+  bool fixed = false;
+};
+
+struct GraphSimilarityEdge {
+  std::uint32_t a = 0;  // index into FactorGraph::similarities
+  std::uint32_t b = 0;
+  Sim3d a_from_b;
+  Matrix7d information = Matrix7d::Identity();
+  bool loop = false;
+};
+
 // An optimisation problem with its numbers: what a map's part, a bundle adjustment file and a pose
 // graph have in common. Plain values; indices into the vectors. The solver moves the estimate.
 struct FactorGraph {
@@ -57,6 +71,8 @@ struct FactorGraph {
   std::vector<GraphPoint> points;
   std::vector<GraphObservation> observations;
   std::vector<GraphEdge> edges;
+  std::vector<GraphSimilarity> similarities;
+  std::vector<GraphSimilarityEdge> similarity_edges;
 
   // Empty if every index is in range, every number finite and every sigma and information
   // positive, else the first thing that is wrong. The solver requires it.

@@ -12,6 +12,9 @@ ProblemConfig make_full_bundle(const MapSnapshot& map, const FullBundleOptions& 
   config.variable_poses = map.keyframe_ids();
   std::erase(config.variable_poses, map.origin());
   config.variable_landmarks = map.landmark_ids();
+  for (std::uint32_t i = 0; options.refine_intrinsics && i < map.camera_count(); ++i) {
+    config.refined_cameras.emplace_back(i);
+  }
   return config;
 }
 

@@ -6,7 +6,8 @@
 namespace hybrid_slam {
 
 struct FullBundleOptions {
-  ProblemOptions problem{.rounds = {{10, true, 1e-4}, {20, false, 1e-8}}};
+  ProblemOptions problem{.rounds = {{10, Loss::kHuber, 1e-4}, {20, Loss::kNone, 1e-8}}};
+  bool refine_intrinsics = false;  // of all cameras; a stereo pair keeps its baseline
 };
 
 // Bundle adjustment of every keyframe but the origin and of every landmark.

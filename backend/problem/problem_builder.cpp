@@ -2,138 +2,240 @@
 
 #include <ceres/cost_function.h>
 #include <ceres/loss_function.h>
+#include <ceres/manifold.h>
 #include <ceres/problem.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "factors/make_reprojection_factor.h"
 #include "factors/manifolds.h"
+#include "factors/relative_pose_factor.h"
+#include "factors/relative_similarity_factor.h"
 
 namespace hybrid_slam {
 
-ProblemTerm::ProblemTerm() = default;
-ProblemTerm::ProblemTerm(ProblemTerm&&) noexcept = default;
-ProblemTerm& ProblemTerm::operator=(ProblemTerm&&) noexcept = default;
-ProblemTerm::~ProblemTerm() = default;
+GraphFactors::GraphFactors() = default;
+GraphFactors::GraphFactors(GraphFactors&&) noexcept = default;
+GraphFactors& GraphFactors::operator=(GraphFactors&&) noexcept = default;
+GraphFactors::~GraphFactors() = default;
 
 namespace {
 
-class Assembler {
- public:
-  Assembler(const MapSnapshot& map, const ProblemConfig& config) : map_(map), config_(config) {}
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-  AssembledProblem assemble() {
-    for (const KeyframeId id : config_.variable_poses) add_pose(id);
-    problem_.variable_poses = problem_.poses.size();
-    for (const KeyframeId id : config_.fixed_poses) add_pose(id);
-    for (const LandmarkId id : config_.variable_landmarks) add_landmark(id, true);
-    problem_.variable_points = problem_.points.size();
-    for (const LandmarkId id : config_.fixed_landmarks) add_landmark(id, false);
+int param_count(const Camera& camera) {
+  return std::visit([](const auto& c) { return static_cast<int>(c.params.size()); }, camera);
+}
+
+const double* params_of(const Camera& camera) {
+  return std::visit([](const auto& c) { return c.params.data(); }, camera);
+}
+
+double squared_norm(const ceres::CostFunction& factor, const double* const* blocks) {
+  double residual[7] = {};
+  if (!factor.Evaluate(blocks, residual, nullptr)) return kInfinity;
+  double sum = 0;
+  for (int i = 0; i < factor.num_residuals(); ++i) sum += residual[i] * residual[i];
+  return sum;
+}
+
+ceres::LossFunction* make_loss(Loss loss, double chi2_threshold) {
+  switch (loss) {
+    case Loss::kHuber:
+      return new ceres::HuberLoss(std::sqrt(chi2_threshold));
+    case Loss::kCauchy:
+      return new ceres::CauchyLoss(std::sqrt(chi2_threshold));
+    case Loss::kNone:
+      break;
+  }
+  return nullptr;
+}
+
+// A loss that is made at its first use, since a problem frees only those that it was given.
+class SharedLoss {
+ public:
+  SharedLoss(Loss loss, double chi2_threshold) : loss_(loss), threshold_(chi2_threshold) {}
+
+  ceres::LossFunction* get() {
+    if (made_ == nullptr) made_ = make_loss(loss_, threshold_);
+    return made_;
+  }
+
+ private:
+  Loss loss_;
+  double threshold_;
+  ceres::LossFunction* made_ = nullptr;
+};
+
+class Builder {
+ public:
+  Builder(FactorGraph& graph, const GraphFactors& factors) : graph_(graph), factors_(factors) {
+    ceres::Problem::Options options;
+    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::TAKE_OWNERSHIP;
+    options.disable_all_safety_checks = true;  // blocks are rows of vectors of their own
+    problem_ = std::make_unique<ceres::Problem>(options);
+  }
+
+  std::unique_ptr<ceres::Problem> build(const ProblemOptions& options, Loss observation_loss) {
+    add_observations(SharedLoss(observation_loss, options.chi2_mono),
+                     SharedLoss(observation_loss, options.chi2_stereo));
+    add_edges(graph_.edges, factors_.edges, SharedLoss(options.loop_loss, options.chi2_loop),
+              [this](std::uint32_t i) { return pose_block(i); });
+    add_edges(graph_.similarity_edges, factors_.similarity_edges,
+              SharedLoss(options.loop_loss, options.chi2_loop),
+              [this](std::uint32_t i) { return similarity_block(i); });
     return std::move(problem_);
   }
 
  private:
-  static constexpr std::uint32_t kAbsent = std::numeric_limits<std::uint32_t>::max();
-
-  void add_pose(KeyframeId id) {
-    const Keyframe* keyframe = map_.find(id);
-    if (keyframe != nullptr) {
-      if (index_of_.size() <= id.value) index_of_.resize(id.value + 1, kAbsent);
-      index_of_[id.value] = static_cast<std::uint32_t>(problem_.poses.size());
-    }
-    keyframes_.push_back(keyframe);
-    problem_.poses.push_back(keyframe != nullptr ? keyframe->cam_from_world : Rigid3d());
-  }
-
-  void add_landmark(LandmarkId id, bool variable) {
-    const auto point = static_cast<std::uint32_t>(problem_.points.size());
-    const Landmark* landmark = map_.find(id);
-    problem_.points.push_back(landmark != nullptr ? landmark->point_in_world
-                                                  : Eigen::Vector3d::Zero().eval());
-    if (landmark == nullptr) return;
-    for (const Observation& observation : landmark->observations) {
-      const std::uint32_t keyframe = observation.keyframe.value;
-      const std::uint32_t pose = keyframe < index_of_.size() ? index_of_[keyframe] : kAbsent;
-      if (pose == kAbsent || (!variable && pose >= problem_.variable_poses)) continue;
-      add_term(id, observation, pose, point);
+  void add_observations(SharedLoss mono, SharedLoss stereo) {
+    camera_blocks_.assign(graph_.cameras.size(), nullptr);
+    for (std::size_t i = 0; i < graph_.observations.size(); ++i) {
+      if (factors_.active[i] == 0) continue;
+      const GraphObservation& observation = graph_.observations[i];
+      const GraphFrame& frame = graph_.frames[observation.frame];
+      double* point = graph_.points[observation.point].in_world.data();
+      const bool refined = graph_.cameras[frame.camera].refined != 0;
+      if (frame.fixed && graph_.points[observation.point].fixed && !refined) continue;
+      SharedLoss& loss = residual_count(factors_, i) == 3 ? stereo : mono;
+      double* pose = pose_block(observation.frame);
+      ceres::CostFunction* factor = factors_.observations[i].get();
+      if (refined) {
+        problem_->AddResidualBlock(factor, loss.get(), pose, point, camera_block(frame.camera));
+      } else {
+        problem_->AddResidualBlock(factor, loss.get(), pose, point);
+      }
+      if (graph_.points[observation.point].fixed) problem_->SetParameterBlockConstant(point);
     }
   }
 
-  void add_term(LandmarkId id, const Observation& observation, std::uint32_t pose,
-                std::uint32_t point) {
-    const FrameObservations& frame = *keyframes_[pose]->observations;
-    const Keypoint& keypoint = frame.features.keypoints[observation.keypoint];
-    const bool stereo = frame.has_right(observation.keypoint);
-    const double u_right = stereo ? frame.u_right[observation.keypoint] : kNoRightMatch;
-    ProblemTerm term;
-    term.factor = make_reprojection_factor(map_.camera(frame.camera),
-                                           {keypoint.x, keypoint.y, u_right}, keypoint.sigma);
-    term.landmark = id;
-    term.observation = observation;
-    term.pose = pose;
-    term.point = point;
-    term.stereo = stereo;
-    problem_.terms.push_back(std::move(term));
+  template <typename Edge, typename BlockOf>
+  void add_edges(const std::vector<Edge>& edges,
+                 const std::vector<std::unique_ptr<ceres::CostFunction>>& factors,
+                 SharedLoss loop_loss, const BlockOf& block_of) {
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      double* a = block_of(edges[i].a);
+      double* b = block_of(edges[i].b);
+      if (problem_->IsParameterBlockConstant(a) && problem_->IsParameterBlockConstant(b)) continue;
+      problem_->AddResidualBlock(factors[i].get(), edges[i].loop ? loop_loss.get() : nullptr, a, b);
+    }
   }
 
-  const MapSnapshot& map_;
-  const ProblemConfig& config_;
-  AssembledProblem problem_;
-  std::vector<const Keyframe*> keyframes_;  // as problem_.poses
-  std::vector<std::uint32_t> index_of_;     // into problem_.poses, by the keyframe's id
+  double* pose_block(std::uint32_t index) {
+    GraphFrame& frame = graph_.frames[index];
+    double* block = frame.cam_from_world.params.data();
+    if (pose_added_.empty()) pose_added_.assign(graph_.frames.size(), 0);
+    if (pose_added_[index] == 0) {
+      pose_added_[index] = 1;
+      problem_->AddParameterBlock(block, 7, new PoseManifold);
+      if (frame.fixed) problem_->SetParameterBlockConstant(block);
+    }
+    return block;
+  }
+
+  double* similarity_block(std::uint32_t index) {
+    GraphSimilarity& similarity = graph_.similarities[index];
+    double* block = similarity.cam_from_world.params.data();
+    if (!problem_->HasParameterBlock(block)) {
+      problem_->AddParameterBlock(block, 8, new Sim3Manifold);
+      if (similarity.fixed) problem_->SetParameterBlockConstant(block);
+    }
+    return block;
+  }
+
+  double* camera_block(std::uint32_t index) {
+    double*& block = camera_blocks_[index];
+    if (block != nullptr) return block;
+    GraphCamera& camera = graph_.cameras[index];
+    block = hybrid_slam::params_of(camera.camera);
+    const int count = param_count(camera.camera);
+    std::vector<int> constant;
+    for (int k = 0; k < count; ++k) {
+      if ((camera.refined >> k & 1U) == 0) constant.push_back(k);
+    }
+    problem_->AddParameterBlock(block, count);
+    if (!constant.empty()) {
+      problem_->SetManifold(block, new ceres::SubsetManifold(count, constant));
+    }
+    return block;
+  }
+
+  FactorGraph& graph_;
+  const GraphFactors& factors_;
+  std::unique_ptr<ceres::Problem> problem_;
+  std::vector<char> pose_added_;
+  std::vector<double*> camera_blocks_;
 };
 
 }  // namespace
 
-AssembledProblem assemble_problem(const MapSnapshot& map, const ProblemConfig& config) {
-  return Assembler(map, config).assemble();
+double* params_of(Camera& camera) {
+  return std::visit([](auto& c) { return c.params.data(); }, camera);
 }
 
-double chi2(const AssembledProblem& problem, const ProblemTerm& term) {
-  const double* blocks[] = {problem.poses[term.pose].params.data(),
-                            problem.points[term.point].data()};
-  double residual[3] = {0, 0, 0};
-  if (!term.factor->Evaluate(blocks, residual, nullptr)) {
-    return std::numeric_limits<double>::infinity();
+GraphFactors make_factors(const FactorGraph& graph) {
+  GraphFactors factors;
+  factors.observations.reserve(graph.observations.size());
+  for (const GraphObservation& observation : graph.observations) {
+    const GraphCamera& camera = graph.cameras[graph.frames[observation.frame].camera];
+    factors.observations.push_back(
+        camera.refined != 0
+            ? make_refining_reprojection_factor(camera.camera, observation.measurement,
+                                                observation.sigma)
+            : make_reprojection_factor(camera.camera, observation.measurement, observation.sigma));
   }
-  return residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];
+  factors.active.assign(graph.observations.size(), 1);
+  factors.edges.reserve(graph.edges.size());
+  for (const GraphEdge& edge : graph.edges) {
+    factors.edges.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
+  }
+  factors.similarity_edges.reserve(graph.similarity_edges.size());
+  for (const GraphSimilarityEdge& edge : graph.similarity_edges) {
+    factors.similarity_edges.push_back(
+        std::make_unique<RelativeSimilarityFactor>(edge.a_from_b, edge.information));
+  }
+  return factors;
 }
 
-std::unique_ptr<ceres::Problem> build_ceres_problem(AssembledProblem& assembled,
-                                                    const ProblemOptions& options, bool robust) {
-  ceres::Problem::Options ceres_options;
-  ceres_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres_options.disable_all_safety_checks = true;  // blocks are rows of vectors of their own
-  auto problem = std::make_unique<ceres::Problem>(ceres_options);
-  // Owned by the problem, which frees a loss once however many terms share it.
-  ceres::LossFunction* mono = nullptr;
-  ceres::LossFunction* stereo = nullptr;
-  std::vector<char> pose_used(assembled.poses.size(), 0);
-  std::vector<char> point_used(assembled.points.size(), 0);
-  for (ProblemTerm& term : assembled.terms) {
-    if (!term.active) continue;
-    ceres::LossFunction*& loss = term.stereo ? stereo : mono;
-    if (robust && loss == nullptr) {
-      loss = new ceres::HuberLoss(std::sqrt(term.stereo ? options.chi2_stereo : options.chi2_mono));
-    }
-    Rigid3d& pose = assembled.poses[term.pose];
-    Eigen::Vector3d& point = assembled.points[term.point];
-    if (!pose_used[term.pose]) {
-      pose_used[term.pose] = 1;
-      problem->AddParameterBlock(pose.params.data(), 7, new PoseManifold);
-      if (term.pose >= assembled.variable_poses) {
-        problem->SetParameterBlockConstant(pose.params.data());
-      }
-    }
-    problem->AddResidualBlock(term.factor.get(), loss, pose.params.data(), point.data());
-    if (!point_used[term.point] && term.point >= assembled.variable_points) {
-      problem->SetParameterBlockConstant(point.data());
-    }
-    point_used[term.point] = 1;
+int residual_count(const GraphFactors& factors, std::size_t observation) {
+  return factors.observations[observation]->num_residuals();
+}
+
+std::vector<double> observations_chi2(const FactorGraph& graph, const GraphFactors& factors) {
+  std::vector<double> values(graph.observations.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const GraphObservation& observation = graph.observations[i];
+    const GraphFrame& frame = graph.frames[observation.frame];
+    const double* blocks[] = {frame.cam_from_world.params.data(),
+                              graph.points[observation.point].in_world.data(),
+                              params_of(graph.cameras[frame.camera].camera)};
+    values[i] = squared_norm(*factors.observations[i], blocks);
   }
-  return problem;
+  return values;
+}
+
+double edges_chi2(const FactorGraph& graph, const GraphFactors& factors) {
+  double sum = 0;
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    const double* blocks[] = {graph.frames[graph.edges[i].a].cam_from_world.params.data(),
+                              graph.frames[graph.edges[i].b].cam_from_world.params.data()};
+    sum += squared_norm(*factors.edges[i], blocks);
+  }
+  for (std::size_t i = 0; i < graph.similarity_edges.size(); ++i) {
+    const GraphSimilarityEdge& edge = graph.similarity_edges[i];
+    const double* blocks[] = {graph.similarities[edge.a].cam_from_world.params.data(),
+                              graph.similarities[edge.b].cam_from_world.params.data()};
+    sum += squared_norm(*factors.similarity_edges[i], blocks);
+  }
+  return sum;
+}
+
+std::unique_ptr<ceres::Problem> build_ceres_problem(FactorGraph& graph, const GraphFactors& factors,
+                                                    const ProblemOptions& options,
+                                                    Loss observation_loss) {
+  return Builder(graph, factors).build(options, observation_loss);
 }
 
 }  // namespace hybrid_slam

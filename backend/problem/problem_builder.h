@@ -1,10 +1,9 @@
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "backend/map/map_snapshot.h"
+#include "backend/problem/factor_graph.h"
 #include "backend/problem/problem_config.h"
 
 namespace ceres {
@@ -14,41 +13,40 @@ class Problem;
 
 namespace hybrid_slam {
 
-// One observation as a term of the cost.
-struct ProblemTerm {
-  ProblemTerm();
-  ProblemTerm(ProblemTerm&&) noexcept;
-  ProblemTerm& operator=(ProblemTerm&&) noexcept;
-  ~ProblemTerm();
+// The terms of a graph as functions that Ceres can evaluate, one for each element of the graph's
+// vectors of the same names. They hold the measurements but not the estimate.
+struct GraphFactors {
+  GraphFactors();
+  GraphFactors(GraphFactors&&) noexcept;
+  GraphFactors& operator=(GraphFactors&&) noexcept;
+  ~GraphFactors();
 
-  std::unique_ptr<ceres::CostFunction> factor;
-  LandmarkId landmark;
-  Observation observation;
-  std::uint32_t pose = 0;   // index into AssembledProblem::poses
-  std::uint32_t point = 0;  // index into AssembledProblem::points
-  bool stereo = false;      // three residuals, else two
-  bool active = true;       // else set aside: beyond its threshold, or it does not project
+  std::vector<std::unique_ptr<ceres::CostFunction>> observations;
+  std::vector<std::unique_ptr<ceres::CostFunction>> edges;
+  std::vector<std::unique_ptr<ceres::CostFunction>> similarity_edges;
+  std::vector<char> active;  // per observation; 0: set aside
 };
 
-// A config with the numbers of a map: the present estimate and a factor for each observation.
-// Lives as long as its rounds, which set terms aside and move the estimate.
-struct AssembledProblem {
-  std::vector<Rigid3d> poses;  // the config's variable poses, then its fixed ones
-  std::size_t variable_poses = 0;
-  std::vector<Eigen::Vector3d> points;  // variable landmarks, then fixed ones
-  std::size_t variable_points = 0;
-  std::vector<ProblemTerm> terms;  // by landmark, then by keyframe
-};
+// Requires a valid graph. All observations are active.
+GraphFactors make_factors(const FactorGraph& graph);
 
-// Ids of the config that the map does not have are skipped by leaving their entries without terms.
-AssembledProblem assemble_problem(const MapSnapshot& map, const ProblemConfig& config);
+// Squared whitened residuals at the present estimate, per observation; infinite where the point
+// does not project.
+std::vector<double> observations_chi2(const FactorGraph& graph, const GraphFactors& factors);
 
-// Squared whitened residual of a term at the present estimate; infinite if it does not project.
-double chi2(const AssembledProblem& problem, const ProblemTerm& term);
+// Of all edges of both kinds together.
+double edges_chi2(const FactorGraph& graph, const GraphFactors& factors);
 
-// The active terms, with Huber's loss if `robust`, as a Ceres problem on the estimate of `problem`,
-// which must outlive it. Poses or points without an active term are not in it.
-std::unique_ptr<ceres::Problem> build_ceres_problem(AssembledProblem& problem,
-                                                    const ProblemOptions& options, bool robust);
+// Rows of the residual of an observation: 3 of a stereo measurement, else 2.
+int residual_count(const GraphFactors& factors, std::size_t observation);
+
+// The active terms as a Ceres problem on the estimate of `graph`; both must outlive it. What is not
+// in a term that varies is not in it.
+std::unique_ptr<ceres::Problem> build_ceres_problem(FactorGraph& graph, const GraphFactors& factors,
+                                                    const ProblemOptions& options,
+                                                    Loss observation_loss);
+
+// The parameter block of a camera's params.
+double* params_of(Camera& camera);
 
 }  // namespace hybrid_slam

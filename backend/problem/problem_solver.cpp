@@ -6,68 +6,104 @@
 #include <ceres/solver.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace hybrid_slam {
 
 namespace {
 
-class StopCallback final : public ceres::IterationCallback {
- public:
-  explicit StopCallback(const std::stop_token& stop) : stop_(stop) {}
+// Frames that vary, up to which the reduced camera system is solved dense, and from which on it is
+// no longer formed (test/benchmark/local_bundle_benchmark, docs/benchmarks.md).
+constexpr std::size_t kMaxDenseFrames = 60;
+constexpr std::size_t kMinIterativeFrames = 20000;
 
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+class WatchingCallback final : public ceres::IterationCallback {
+ public:
+  WatchingCallback(const std::stop_token& stop,
+                   const std::function<void(const IterationReport&)>& progress)
+      : stop_(stop), progress_(progress) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
+    if (progress_) {
+      progress_({0, iteration.iteration, iteration.cost, iteration.step_norm,
+                 iteration.cumulative_time_in_seconds});
+    }
     return stop_.stop_requested() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
  private:
   const std::stop_token& stop_;
+  const std::function<void(const IterationReport&)>& progress_;
 };
 
-// Landmarks first, then poses: without it Ceres looks for an independent set by itself.
-std::shared_ptr<ceres::ParameterBlockOrdering> elimination_order(AssembledProblem& assembled,
+// Landmarks first, then poses and intrinsics: without it Ceres looks for an independent set by
+// itself.
+std::shared_ptr<ceres::ParameterBlockOrdering> elimination_order(FactorGraph& graph,
                                                                  const ceres::Problem& problem) {
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (Eigen::Vector3d& point : assembled.points) {
-    if (problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
-  }
-  for (Rigid3d& pose : assembled.poses) {
-    double* block = pose.params.data();
-    if (problem.HasParameterBlock(block)) ordering->AddElementToGroup(block, 1);
-  }
+  const auto add = [&](double* block, int group) {
+    if (problem.HasParameterBlock(block)) ordering->AddElementToGroup(block, group);
+  };
+  for (GraphPoint& point : graph.points) add(point.in_world.data(), 0);
+  for (GraphFrame& frame : graph.frames) add(frame.cam_from_world.params.data(), 1);
+  for (GraphSimilarity& vertex : graph.similarities) add(vertex.cam_from_world.params.data(), 1);
+  for (GraphCamera& camera : graph.cameras) add(params_of(camera.camera), 1);
   return ordering;
 }
 
-bool is_finite(const AssembledProblem& problem) {
-  const auto finite_pose = [](const Rigid3d& pose) { return pose.params.allFinite(); };
-  const auto finite_point = [](const Eigen::Vector3d& point) { return point.allFinite(); };
-  return std::all_of(problem.poses.begin(), problem.poses.end(), finite_pose) &&
-         std::all_of(problem.points.begin(), problem.points.end(), finite_point);
+bool is_finite(const FactorGraph& graph) {
+  return std::all_of(graph.frames.begin(), graph.frames.end(),
+                     [](const auto& f) { return f.cam_from_world.params.allFinite(); }) &&
+         std::all_of(graph.points.begin(), graph.points.end(),
+                     [](const auto& p) { return p.in_world.allFinite(); }) &&
+         std::all_of(graph.similarities.begin(), graph.similarities.end(),
+                     [](const auto& s) { return s.cam_from_world.params.allFinite(); });
 }
 
-bool has_active_terms(const AssembledProblem& problem) {
-  return std::any_of(problem.terms.begin(), problem.terms.end(),
-                     [](const ProblemTerm& term) { return term.active; });
+ceres::LinearSolverType linear_solver_of(const FactorGraph& graph, LinearSolver wanted) {
+  const bool bundle = !graph.points.empty();
+  if (wanted == LinearSolver::kAuto) {
+    const auto frames = static_cast<std::size_t>(std::count_if(
+        graph.frames.begin(), graph.frames.end(), [](const auto& frame) { return !frame.fixed; }));
+    wanted = LinearSolver::kSparse;
+    if (bundle && frames <= kMaxDenseFrames) wanted = LinearSolver::kDense;
+    if (bundle && frames >= kMinIterativeFrames) wanted = LinearSolver::kIterative;
+  }
+  switch (wanted) {
+    case LinearSolver::kDense:
+      return bundle ? ceres::DENSE_SCHUR : ceres::DENSE_NORMAL_CHOLESKY;
+    case LinearSolver::kIterative:
+      return bundle ? ceres::ITERATIVE_SCHUR : ceres::CGNR;
+    default:
+      return bundle ? ceres::SPARSE_SCHUR : ceres::SPARSE_NORMAL_CHOLESKY;
+  }
 }
 
-ceres::Solver::Options solver_options(AssembledProblem& assembled, const ceres::Problem& problem,
+ceres::Solver::Options solver_options(FactorGraph& graph, const ceres::Problem& problem,
                                       const ProblemOptions& options, const SolveRound& round) {
   ceres::Solver::Options solver;
-  const bool dense = assembled.variable_poses <= static_cast<std::size_t>(options.max_dense_poses);
-  solver.linear_solver_type = dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
-  solver.linear_solver_ordering = elimination_order(assembled, problem);
+  solver.linear_solver_type = linear_solver_of(graph, options.linear_solver);
+  if (solver.linear_solver_type == ceres::ITERATIVE_SCHUR) {
+    solver.preconditioner_type = ceres::SCHUR_JACOBI;
+  }
+  if (!graph.points.empty()) solver.linear_solver_ordering = elimination_order(graph, problem);
   solver.max_num_iterations = round.iterations;
   solver.function_tolerance = round.function_tolerance;
+  solver.initial_trust_region_radius = options.trust_region;
+  if (options.max_seconds > 0) solver.max_solver_time_in_seconds = options.max_seconds;
   solver.num_threads = options.threads;
   solver.logging_type = ceres::SILENT;
   return solver;
 }
 
-SolveEnd end_of(const ceres::Solver::Summary& summary) {
+SolveEnd end_of(const ceres::Solver::Summary& summary, const ProblemOptions& options) {
   switch (summary.termination_type) {
     case ceres::CONVERGENCE:
       return SolveEnd::kConverged;
     case ceres::NO_CONVERGENCE:
-      return SolveEnd::kIterationLimit;
+      return options.max_seconds > 0 && summary.total_time_in_seconds >= options.max_seconds
+                 ? SolveEnd::kTimeLimit
+                 : SolveEnd::kIterationLimit;
     case ceres::USER_SUCCESS:
       return SolveEnd::kStopped;
     default:
@@ -77,22 +113,40 @@ SolveEnd end_of(const ceres::Solver::Summary& summary) {
 
 }  // namespace
 
-SolveOutcome solve_round(AssembledProblem& assembled, const ProblemOptions& options,
-                         const SolveRound& round, const std::stop_token& stop) {
-  if (stop.stop_requested()) return {SolveEnd::kStopped, "stopped before the first iteration", 0};
-  if (!is_finite(assembled)) return {SolveEnd::kFailed, "initial values are not finite", 0};
-  if (!has_active_terms(assembled)) return {SolveEnd::kEmpty, "no observations", 0};
-  const auto problem = build_ceres_problem(assembled, options, round.robust);
-  ceres::Solver::Options solver = solver_options(assembled, *problem, options, round);
-  StopCallback callback(stop);
+SolveOutcome solve_round(FactorGraph& graph, const GraphFactors& factors,
+                         const ProblemOptions& options, const SolveRound& round,
+                         const std::stop_token& stop,
+                         const std::function<void(const IterationReport&)>& progress) {
+  SolveOutcome outcome;
+  if (stop.stop_requested()) {
+    outcome.end = SolveEnd::kStopped;
+    outcome.text = "stopped before the first iteration";
+    return outcome;
+  }
+  if (!is_finite(graph)) {
+    outcome.end = SolveEnd::kFailed;
+    outcome.text = "initial values are not finite";
+    return outcome;
+  }
+  const auto problem = build_ceres_problem(graph, factors, options, round.loss);
+  if (problem->NumResidualBlocks() == 0) {
+    outcome.text = "nothing varies, or nothing was observed";
+    return outcome;
+  }
+  ceres::Solver::Options solver = solver_options(graph, *problem, options, round);
+  WatchingCallback callback(stop, progress);
   solver.callbacks.push_back(&callback);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, problem.get(), &summary);
 
-  SolveOutcome outcome{end_of(summary), summary.message, 0};
-  outcome.iterations = static_cast<int>(summary.iterations.size()) - 1;
-  if (outcome.end == SolveEnd::kStopped) outcome.text = "stopped on request";
-  if (outcome.end != SolveEnd::kFailed && !is_finite(assembled)) {
+  outcome.end = end_of(summary, options);
+  outcome.text = outcome.end == SolveEnd::kStopped ? "stopped on request" : summary.message;
+  outcome.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
+  outcome.build_seconds = summary.preprocessor_time_in_seconds;
+  outcome.residual_seconds = summary.residual_evaluation_time_in_seconds;
+  outcome.jacobian_seconds = summary.jacobian_evaluation_time_in_seconds;
+  outcome.linear_solver_seconds = summary.linear_solver_time_in_seconds;
+  if (outcome.end != SolveEnd::kFailed && !is_finite(graph)) {
     outcome.end = SolveEnd::kFailed;
     outcome.text = "the solution is not finite";
   }

@@ -25,6 +25,9 @@ struct GraphSummary {
   // Half the squared whitened residuals of every term that can be evaluated, without a loss.
   double initial_cost = 0;
   double final_cost = 0;
+  // The same of the terms that are no outliers at the end.
+  double kept_initial_cost = 0;
+  double kept_final_cost = 0;
   int iterations = 0;
   std::vector<std::uint32_t> unprojectable;  // observations left out: their point does not project
   std::vector<std::uint32_t> outliers;       // observations beyond their chi2 threshold at the end

@@ -5,7 +5,9 @@
 
 #include "backend/backend.h"
 #include "backend/map/covisibility.h"
+#include "backend/problem/map_graph.h"
 #include "backend/problem/problem_solver.h"
+#include "backend/problem/solve_bundle.h"
 #include "cameras/geometry/se3.h"
 #include "test/backend/truth_check.h"
 #include "test/support/random.h"
@@ -20,7 +22,7 @@ constexpr FillOptions kNoisyStart{
 // covariance is known.
 ProblemOptions without_rejection() {
   ProblemOptions options;
-  options.rounds = {{10, true, 1e-4}, {20, false, 1e-10}};
+  options.rounds = {{10, Loss::kHuber, 1e-4}, {20, Loss::kNone, 1e-10}};
   options.chi2_mono = options.chi2_stereo = 60;
   return options;
 }
@@ -240,7 +242,7 @@ TEST_CASE("A stopped optimisation keeps what it has and erases nothing") {
     later.request_stop();
   });
   ProblemConfig endless = config;
-  endless.options.rounds = {{10000, false, 0}};
+  endless.options.rounds = {{10000, Loss::kNone, 0}};
   const BundleResult result = solve_bundle(filled.map.view(), endless, later.get_token());
   CHECK((result.summary.end == SolveEnd::kStopped || result.summary.end == SolveEnd::kConverged));
   CHECK(result.summary.iterations < 10000);
@@ -272,9 +274,11 @@ TEST_CASE("No result comes from values that are not finite, from nothing, or fro
   const SyntheticScene scene = make_synthetic_scene({.times = 4, .landmarks = 300});
   FilledMap filled = fill_map(scene, {});
   ProblemConfig config = make_full_bundle(filled.map.view(), {});
-  AssembledProblem problem = assemble_problem(filled.map.view(), config);
-  problem.poses[0].translation().x() = std::numeric_limits<double>::quiet_NaN();
-  CHECK(solve_round(problem, {}, {5, false, 0}, {}).end == SolveEnd::kFailed);
+  FactorGraph graph = make_graph(filled.map.view(), config).graph;
+  const GraphFactors factors = make_factors(graph);
+  graph.frames[0].cam_from_world.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  CHECK(solve_round(graph, factors, {}, {5, Loss::kNone, 0}, {}).end == SolveEnd::kFailed);
+  CHECK_THROWS_AS(solve_graph(graph, {}), std::invalid_argument);
 
   CHECK(solve_bundle(filled.map.view(), {}).summary.end == SolveEnd::kEmpty);
   ProblemConfig stale = config;  // as if made from an older snapshot

@@ -5,7 +5,7 @@
 #include <benchmark/benchmark.h>
 #include <ceres/ceres.h>
 
-#include "backend/problem/problem_solver.h"
+#include "backend/problem/solve_bundle.h"
 #include "cameras/geometry/se3.h"
 #include "test/support/filled_map.h"
 #include "test/support/random.h"
@@ -46,7 +46,7 @@ ProblemConfig equal_work(const MapSnapshot& map) {
   config.variable_poses = map.keyframe_ids();
   config.variable_poses.erase(config.variable_poses.begin());
   config.variable_landmarks = map.landmark_ids();
-  config.options.rounds = {{kIterations, false, 0}};
+  config.options.rounds = {{kIterations, Loss::kNone, 0}};
   config.options.chi2_mono = config.options.chi2_stereo = 1e9;
   return config;
 }
