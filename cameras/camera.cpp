@@ -53,7 +53,8 @@ bool in_image(const Camera& camera, const Eigen::Vector2d& pixel) {
 }
 
 double focal_length(const Camera& camera) {
-  return std::visit([](const auto& c) { return 0.5 * (c.params[0] + c.params[1]); }, camera);
+  return std::visit(
+      []<typename M>(const Calibrated<M>& c) { return M::focal_length(c.params.data()); }, camera);
 }
 
 double baseline(const Camera& camera) {

@@ -7,9 +7,11 @@
 
 #include <Eigen/Core>
 
+#include "cameras/bal.h"
 #include "cameras/kannala_brandt.h"
 #include "cameras/pinhole.h"
 #include "cameras/projection.h"
+#include "cameras/radial.h"
 #include "cameras/rectified_stereo.h"
 
 namespace hybrid_slam {
@@ -25,8 +27,8 @@ struct Calibrated {
 
 // One of the models, chosen at run time. Visited when a residual is created or a batch is
 // projected, never inside a model's own loop.
-using Camera =
-    std::variant<Calibrated<Pinhole>, Calibrated<RectifiedStereo>, Calibrated<KannalaBrandt>>;
+using Camera = std::variant<Calibrated<Pinhole>, Calibrated<RectifiedStereo>,
+                            Calibrated<KannalaBrandt>, Calibrated<Radial>, Calibrated<Bal>>;
 
 // Pixel (u, v) of a point (the left one of a stereo pair); none if it cannot be projected. May lie
 // outside the image: see in_image.
@@ -46,7 +48,7 @@ std::optional<Eigen::Vector3d> triangulate_stereo(const Camera& camera,
 // Whether a pixel lies on the image: from -0.5 to size - 0.5, as pixel centres are integers.
 bool in_image(const Camera& camera, const Eigen::Vector2d& pixel);
 
-double focal_length(const Camera& camera);  // mean of fx and fy [px]
+double focal_length(const Camera& camera);  // [px]; the mean where a model has two
 double baseline(const Camera& camera);      // [m]; 0 unless it is a stereo pair
 int image_width(const Camera& camera);      // [px]
 int image_height(const Camera& camera);     // [px]

@@ -17,6 +17,8 @@ struct KannalaBrandt {
   static constexpr int kMeasurementDim = 2;
   static constexpr int kParamCount = 8;  // fx, fy, cx, cy [px], k1, k2, k3, k4
 
+  static double focal_length(const double* params) { return 0.5 * (params[0] + params[1]); }
+
   template <typename T>
   static bool project(const T* params, const T* point_in_cam, T* pixel) {
     using std::atan2;

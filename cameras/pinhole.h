@@ -14,6 +14,8 @@ struct Pinhole {
   static constexpr int kMeasurementDim = 2;
   static constexpr int kParamCount = 4;  // fx, fy, cx, cy [px]
 
+  static double focal_length(const double* params) { return 0.5 * (params[0] + params[1]); }
+
   template <typename T>
   static bool project(const T* params, const T* point_in_cam, T* pixel) {
     if (!(point_in_cam[2] > T(kMinDepth))) return false;

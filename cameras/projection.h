@@ -11,6 +11,7 @@ namespace hybrid_slam {
 // rectified pair. Matrices are row-major. See docs/adding_a_camera.md.
 //
 //   kName, kMeasurementDim, kParamCount
+//   focal_length(params)  [px]; the mean where there are two
 //   project<T>(params, point_in_cam, measurement)
 //       False, and the measurement untouched, if the point cannot be projected.
 //   project_with_jacobians(params, point_in_cam, measurement, d_point, d_params)
@@ -23,6 +24,7 @@ concept ProjectionModel = requires(const double* in, double* out) {
   { M::kName } -> std::convertible_to<std::string_view>;
   { M::kMeasurementDim } -> std::convertible_to<int>;
   { M::kParamCount } -> std::convertible_to<int>;
+  { M::focal_length(in) } -> std::same_as<double>;
   { M::template project<double>(in, in, out) } -> std::same_as<bool>;
   { M::project_with_jacobians(in, in, out, out, out) } -> std::same_as<bool>;
   { M::unproject(in, in, out) } -> std::same_as<bool>;

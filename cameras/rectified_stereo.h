@@ -14,6 +14,8 @@ struct RectifiedStereo {
   static constexpr int kMeasurementDim = 3;
   static constexpr int kParamCount = 5;  // fx, fy, cx, cy [px], baseline [m]
 
+  static double focal_length(const double* params) { return Pinhole::focal_length(params); }
+
   template <typename T>
   static bool project(const T* params, const T* point_in_cam, T* measurement) {
     if (!Pinhole::project(params, point_in_cam, measurement)) return false;
@@ -68,6 +70,8 @@ struct LeftOfStereo {
   static constexpr std::string_view kName = "left_of_stereo";
   static constexpr int kMeasurementDim = 2;
   static constexpr int kParamCount = RectifiedStereo::kParamCount;
+
+  static double focal_length(const double* params) { return Pinhole::focal_length(params); }
 
   template <typename T>
   static bool project(const T* params, const T* point_in_cam, T* pixel) {

@@ -15,6 +15,10 @@ template class ReprojectionFactor<RectifiedStereo, Intrinsics::kRefined>;
 template class ReprojectionFactor<LeftOfStereo, Intrinsics::kRefined>;
 template class ReprojectionFactor<KannalaBrandt, Intrinsics::kFixed>;
 template class ReprojectionFactor<KannalaBrandt, Intrinsics::kRefined>;
+template class ReprojectionFactor<Radial, Intrinsics::kFixed>;
+template class ReprojectionFactor<Radial, Intrinsics::kRefined>;
+template class ReprojectionFactor<Bal, Intrinsics::kFixed>;
+template class ReprojectionFactor<Bal, Intrinsics::kRefined>;
 
 namespace {
 

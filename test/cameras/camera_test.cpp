@@ -12,13 +12,21 @@ TEST_CASE("Camera: each model behind the variant") {
   const Camera mono = TestCamera<Pinhole>::camera();
   const Camera stereo = TestCamera<RectifiedStereo>::camera();
   const Camera fisheye = TestCamera<KannalaBrandt>::camera();
+  const Camera radial = TestCamera<Radial>::camera();
+  const Camera bal = TestCamera<Bal>::camera();
   const Eigen::Vector3d point(0.3, -0.2, 2);
   const Eigen::Vector3d beside(3, 0.1, -0.2);
 
   CHECK(model_name(mono) == "pinhole");
   CHECK(model_name(stereo) == "rectified_stereo");
   CHECK(model_name(fisheye) == "kannala_brandt");
+  CHECK(model_name(radial) == "radial");
+  CHECK(model_name(bal) == "bal");
   CHECK(focal_length(mono) == Approx(869.8));
+  CHECK(focal_length(stereo) == 868.4);
+  CHECK(focal_length(fisheye) == Approx(302.55));
+  CHECK(focal_length(radial) == 712.4);
+  CHECK(focal_length(bal) == 712.4);
   CHECK(baseline(stereo) == 0.15);
   CHECK(baseline(mono) == 0);
   CHECK(image_width(fisheye) == 1024);
@@ -26,8 +34,9 @@ TEST_CASE("Camera: each model behind the variant") {
 
   CHECK_FALSE(project(mono, beside).has_value());
   CHECK_FALSE(project(stereo, beside).has_value());
+  CHECK_FALSE(project(radial, beside).has_value());
   CHECK(project(fisheye, beside).has_value());
-  for (const Camera& camera : {mono, stereo, fisheye}) {
+  for (const Camera& camera : {mono, stereo, fisheye, radial}) {
     const auto pixel = project(camera, point);
     REQUIRE(pixel.has_value());
     CHECK(in_image(camera, *pixel));

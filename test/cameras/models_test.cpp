@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <limits>
+#include <type_traits>
+#include <vector>
 
 #include <ceres/jet.h>
 #include <catch2/catch.hpp>
@@ -49,7 +51,7 @@ Projection<M> by_jets(const double* params, const Eigen::Vector3d& point) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("Models: analytic Jacobians against jets and numeric differences", "", Pinhole,
-                   RectifiedStereo, LeftOfStereo, KannalaBrandt) {
+                   RectifiedStereo, LeftOfStereo, KannalaBrandt, Radial, Bal) {
   using M = TestType;
   Random random(11);
   const auto params = TestCamera<M>::camera().params;
@@ -78,7 +80,7 @@ TEMPLATE_TEST_CASE("Models: analytic Jacobians against jets and numeric differen
 }
 
 TEMPLATE_TEST_CASE("Models: unproject inverts project", "", Pinhole, RectifiedStereo, LeftOfStereo,
-                   KannalaBrandt) {
+                   KannalaBrandt, Radial, Bal) {
   using M = TestType;
   Random random(12);
   const auto params = TestCamera<M>::camera().params;
@@ -94,13 +96,15 @@ TEMPLATE_TEST_CASE("Models: unproject inverts project", "", Pinhole, RectifiedSt
 }
 
 TEMPLATE_TEST_CASE("Models: what cannot be projected leaves the output untouched", "", Pinhole,
-                   RectifiedStereo, LeftOfStereo, KannalaBrandt) {
+                   RectifiedStereo, LeftOfStereo, KannalaBrandt, Radial, Bal) {
   using M = TestType;
   const auto params = TestCamera<M>::camera().params;
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const Eigen::Vector3d& point :
-       {Eigen::Vector3d(0, 0, -1), Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1e-9, 0, -2),
-        Eigen::Vector3d(0.1, 0.1, nan)}) {
+  std::vector<Eigen::Vector3d> points{{0, 0, 0}, {0.1, 0.1, nan}};
+  if (!std::is_same_v<M, Bal>) {  // which sees both sides
+    points.insert(points.end(), {{0, 0, -1}, {1e-9, 0, -2}});
+  }
+  for (const Eigen::Vector3d& point : points) {
     double measurement[3] = {-7, -8, -9};
     CHECK_FALSE(M::project(params.data(), point.data(), measurement));
     double d_point[9];
@@ -125,6 +129,80 @@ TEST_CASE("Pinhole and stereo: known values") {
   CHECK(measurement[1] == Approx(40));
   const double on_the_plane[3] = {1, 1, 0};
   CHECK_FALSE(Pinhole::project(params, on_the_plane, measurement));
+}
+
+TEST_CASE("Radial and BAL: known values, in front and behind") {
+  const double f = 500, k1 = -0.2, k2 = 0.04;
+  const double scale = 1 + k1 * 0.3125 + k2 * 0.3125 * 0.3125;  // of r^2 = 0.25^2 + 0.5^2
+  const double radial[5] = {f, 320, 240, k1, k2};
+  const double bal[3] = {f, k1, k2};
+  double pixel[2];
+  const Eigen::Vector3d ahead(1, -2, 4);
+  REQUIRE(Radial::project(radial, ahead.data(), pixel));
+  CHECK(pixel[0] == Approx(320 + f * scale * 0.25).epsilon(1e-14));
+  CHECK(pixel[1] == Approx(240 - f * scale * 0.5).epsilon(1e-14));
+  REQUIRE(Bal::project(bal, ahead.data(), pixel));  // behind a camera that looks along -z
+  CHECK(pixel[0] == Approx(-f * scale * 0.25).epsilon(1e-14));
+  CHECK(pixel[1] == Approx(f * scale * 0.5).epsilon(1e-14));
+  const Eigen::Vector3d other_side(1, -2, -4);
+  CHECK_FALSE(Radial::project(radial, other_side.data(), pixel));
+  REQUIRE(Bal::project(bal, other_side.data(), pixel));
+  CHECK(pixel[0] == Approx(f * scale * 0.25).epsilon(1e-14));
+  CHECK(pixel[1] == Approx(-f * scale * 0.5).epsilon(1e-14));
+
+  Random random(14);
+  for (int i = 0; i < 20; ++i) {  // the derivatives behind the camera, too
+    const Eigen::Vector3d behind(random.uniform(-1, 1), random.uniform(-1, 1), 1.5);
+    const Projection<Bal> a = analytic<Bal>(bal, behind);
+    const Projection<Bal> j = by_jets<Bal>(bal, behind);
+    CHECK(jacobian_mismatch(a.d_point, j.d_point) < 1e-12);
+    CHECK(jacobian_mismatch(a.d_params, j.d_params) < 1e-12);
+  }
+}
+
+TEST_CASE("Radial: beyond the radius where the distortion stops growing") {
+  // r + k1 r^3 grows up to r = 1 / sqrt(-3 k1): here 1, where the distorted radius is 2/3.
+  const double params[5] = {300, 500, 400, -1.0 / 3, 0};
+  CHECK(RadialDistortion{-1.0 / 3, 0}.max_radius() == Approx(1).epsilon(1e-14));
+  double out[3];
+  const double beyond[3] = {3, 0, 2};
+  REQUIRE(Radial::project(params, beyond, out));
+  CHECK(out[0] == Approx(500 + 300 * (1.5 - 1.5 * 1.5 * 1.5 / 3)));
+  const double outside[2] = {500 + 300 * 0.667, 400};
+  const double inside[2] = {500 + 300 * 0.666, 400};
+  CHECK_FALSE(Radial::unproject(params, outside, out));
+  REQUIRE(Radial::unproject(params, inside, out));
+  CHECK(out[0] / out[2] < 1);
+  // (1 - 4 w)(1 - w / 4) is the derivative for k1 = -4.25 / 3, k2 = 1 / 5: it recovers later on.
+  CHECK(RadialDistortion{-4.25 / 3, 0.2}.max_radius() == Approx(0.5).epsilon(1e-14));
+  CHECK(std::isinf(RadialDistortion{0, 0}.max_radius()));
+  CHECK(std::isinf(RadialDistortion{0.3, 0.1}.max_radius()));
+  CHECK(std::isinf(RadialDistortion{-0.4, 0.2}.max_radius()));  // dips, but stays above zero
+  const double nan[2] = {std::numeric_limits<double>::quiet_NaN(), 0};
+  CHECK_FALSE(Radial::unproject(params, nan, out));
+  CHECK_FALSE(Bal::unproject(params, nan, out));
+}
+
+TEST_CASE("Radial: unproject cannot diverge") {
+  Random random(15);
+  int inverted = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const RadialDistortion distortion{random.uniform(-1, 1), random.uniform(-1, 1)};
+    const double limit = distortion.max_radius();
+    const double distorted = random.uniform(0, 3);
+    double r = -1;
+    if (distortion.undistort(distorted, r)) {
+      const double again = r * (1 + r * r * (distortion.k1 + r * r * distortion.k2));
+      CAPTURE(distortion.k1, distortion.k2, distorted, limit, r);
+      CHECK(r <= limit);
+      CHECK(again == Approx(distorted).epsilon(1e-13).margin(1e-13));
+      ++inverted;
+    } else {
+      CHECK(distorted >
+            limit * (1 + limit * limit * (distortion.k1 + limit * limit * distortion.k2)));
+    }
+  }
+  CHECK(inverted > 2000);
 }
 
 TEST_CASE("Kannala-Brandt: known values, beyond 90 degrees too") {

@@ -33,6 +33,9 @@ std::vector<Observation<M>> observations(Random& random) {
   const auto params = TestCamera<M>::camera().params;
   std::vector<Observation<M>> result;
   for (const Eigen::Vector3d& point : test_points<M>(random)) {
+    // Where no principal point is a parameter, the derivatives by the intrinsics vanish on the
+    // axis: there would be nothing to compare but rounding errors.
+    if (std::is_same_v<M, Bal> && point.head<2>().norm() < 5e-3 * std::abs(point[2])) continue;
     Observation<M> o;
     o.cam_from_world = random.rigid(5, 3.1);
     o.point_in_world = inverse(o.cam_from_world) * point;
@@ -99,7 +102,7 @@ class WrongSign final : public ceres::CostFunction {
 }  // namespace
 
 TEMPLATE_TEST_CASE("Reprojection: Jacobians against jets and numeric differences", "", Pinhole,
-                   RectifiedStereo, LeftOfStereo, KannalaBrandt) {
+                   RectifiedStereo, LeftOfStereo, KannalaBrandt, Radial, Bal) {
   using M = TestType;
   Random random(21);
   const auto params = TestCamera<M>::camera().params;
@@ -129,7 +132,7 @@ TEMPLATE_TEST_CASE("Reprojection: Jacobians against jets and numeric differences
 }
 
 TEMPLATE_TEST_CASE("Reprojection: the residual is the error in standard deviations", "", Pinhole,
-                   RectifiedStereo, KannalaBrandt) {
+                   RectifiedStereo, KannalaBrandt, Radial, Bal) {
   using M = TestType;
   Random random(22);
   const Camera camera = TestCamera<M>::camera();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <type_traits>
 #include <vector>
 
 #include "cameras/camera.h"
@@ -39,6 +40,21 @@ struct TestCamera<KannalaBrandt> {
   }
 };
 
+template <>
+struct TestCamera<Radial> {
+  static Calibrated<Radial> camera() { return {{712.4, 506.3, 391.7, -0.087, 0.023}, 1024, 768}; }
+};
+
+// From the lower left corner of an image of this size upwards, as Bal counts from the centre.
+template <>
+struct TestCamera<Bal> {
+  static Calibrated<Bal> camera() { return {{712.4, -0.087, 0.023}, 512, 384}; }
+};
+
+// The sign of z in front of the camera.
+template <ProjectionModel M>
+inline constexpr double kAhead = std::is_same_v<M, Bal> ? -1 : 1;
+
 template <ProjectionModel M>
 std::vector<Eigen::Vector3d> test_points(Random& random) {
   const Calibrated<M> camera = TestCamera<M>::camera();
@@ -56,9 +72,9 @@ std::vector<Eigen::Vector3d> test_points(Random& random) {
     for (const double v : {-0.5, h / 2, h - 0.5}) add_pixel(u, v);
   }
   for (int i = 0; i < 50; ++i) add_pixel(random.uniform(0, w), random.uniform(0, h));
-  points.emplace_back(0, 0, 2);
+  points.emplace_back(0, 0, 2 * kAhead<M>);
   for (const double tilt : {1e-12, 1e-9, 1e-6, 1e-4, 0.0099, 0.0101, 0.02}) {
-    points.push_back(3 * Eigen::Vector3d(tilt * 0.6, -tilt * 0.8, 1));
+    points.push_back(3 * Eigen::Vector3d(tilt * 0.6, -tilt * 0.8, kAhead<M>));
   }
   if constexpr (std::is_same_v<M, KannalaBrandt>) {
     const double limit = M::max_angle(camera.params.data());
