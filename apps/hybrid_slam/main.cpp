@@ -26,12 +26,7 @@ void on_signal(int signal) {
 
 // Before hours of work, not after: can the results be written?
 void make_output_folder(const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error || !std::filesystem::is_directory(folder)) {
-    throw OutputError(folder + ": cannot be made: " + error.message());
-  }
-  write_file(std::filesystem::path(folder) / "summary.json", "{}\n");
+  write_file(make_folder(folder) / "summary.json", "{}\n");
 }
 
 int run(const CommandLine& line) {

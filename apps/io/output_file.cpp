@@ -60,6 +60,15 @@ class TemporaryFile {
 
 }  // namespace
 
+std::filesystem::path make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    throw OutputError(folder.string() + ": cannot be made: " + error.message());
+  }
+  return folder;
+}
+
 void write_file(const std::filesystem::path& path, std::string_view content) {
   TemporaryFile file(path);
   file.write_all(content);

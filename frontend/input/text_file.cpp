@@ -19,6 +19,19 @@ std::string_view trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
+std::ifstream open_file(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) throw InputError(path.string() + ": no such file");
+  // Checked before opening: to open a pipe waits for its writer.
+  const bool is_regular = fs::is_regular_file(path, ignored);
+  std::ifstream file;
+  if (is_regular) file.open(path, std::ios::binary);
+  if (!file.is_open()) throw InputError(path.string() + ": cannot be read");
+  return file;
+}
+
+}  // namespace
+
 std::string quote(std::string_view field) {
   std::string quoted(1, '"');
   for (const char c : field.substr(0, kMaxQuoted)) quoted += c >= ' ' && c <= '~' ? c : '?';
@@ -26,20 +39,21 @@ std::string quote(std::string_view field) {
   return quoted;
 }
 
-}  // namespace
-
 InputError line_error(const fs::path& path, int line, std::string_view reason) {
   return InputError(path.string() + ":" + std::to_string(line) + ": " + std::string(reason));
 }
 
+std::string read_file(const fs::path& path) {
+  std::ifstream file = open_file(path);
+  std::error_code error;
+  std::string content(fs::file_size(path, error), '\0');
+  if (!error) file.read(content.data(), static_cast<std::streamsize>(content.size()));
+  if (error || !file) throw InputError(path.string() + ": reading failed");
+  return content;
+}
+
 std::vector<TextLine> read_lines(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) throw InputError(path.string() + ": no such file");
-  // Checked before opening: to open a pipe waits for its writer.
-  const bool is_regular = fs::is_regular_file(path, ignored);
-  std::ifstream file;
-  if (is_regular) file.open(path);
-  if (!file.is_open()) throw InputError(path.string() + ": cannot be read");
+  std::ifstream file = open_file(path);
   std::vector<TextLine> lines;
   std::string text;
   for (int number = 1; std::getline(file, text); ++number) {

@@ -24,6 +24,12 @@ struct NumberRow {
 // "path:line: reason", the way every reader of text here complains.
 InputError line_error(const std::filesystem::path& path, int line, std::string_view reason);
 
+// A piece of a file as it may stand in an error line: in quotes, printable, not too long.
+std::string quote(std::string_view field);
+
+// The whole content, binary or text. Throws InputError if the file cannot be read.
+std::string read_file(const std::filesystem::path& path);
+
 // Throws InputError if the file cannot be read.
 std::vector<TextLine> read_lines(const std::filesystem::path& path);
 

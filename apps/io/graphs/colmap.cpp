@@ -1,0 +1,227 @@
+#include "apps/io/graphs/colmap.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "apps/io/graphs/colmap_rigs.h"
+#include "apps/io/output_file.h"
+
+namespace hybrid_slam {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kFirstPixelCentre = 0.5;  // in COLMAP's pixels, in both directions
+
+// Both programs have the focal lengths first, then the principal point, then the distortion.
+std::size_t focal_lengths(const ColmapCameraKind& kind) {
+  const bool two =
+      kind.model == ColmapCameraModel::kPinhole || kind.model == ColmapCameraModel::kOpencvFisheye;
+  return two ? 2 : 1;
+}
+
+// All but the principal point.
+std::uint32_t refined_params(const ColmapCameraKind& kind) {
+  const std::uint32_t all = (1U << kind.params) - 1;
+  return all & ~(0b11U << focal_lengths(kind));
+}
+
+// A simpler model's missing coefficients are zero.
+template <ProjectionModel M>
+GraphCamera to_graph(const ColmapCamera& camera) {
+  Calibrated<M> result{{}, static_cast<int>(camera.width), static_cast<int>(camera.height)};
+  std::copy(camera.params.begin(), camera.params.end(), result.params.begin());
+  const std::size_t principal = focal_lengths(camera.kind);
+  result.params[principal] -= kFirstPixelCentre;
+  result.params[principal + 1] -= kFirstPixelCentre;
+  return {result, refined_params(camera.kind)};
+}
+
+GraphCamera to_graph(const ColmapCamera& camera) {
+  switch (camera.kind.model) {
+    case ColmapCameraModel::kSimplePinhole:
+    case ColmapCameraModel::kSimpleRadial:
+    case ColmapCameraModel::kRadial:
+      return to_graph<Radial>(camera);
+    case ColmapCameraModel::kPinhole:
+      return to_graph<Pinhole>(camera);
+    case ColmapCameraModel::kOpencvFisheye:
+      return to_graph<KannalaBrandt>(camera);
+  }
+  throw std::logic_error("no such COLMAP camera");
+}
+
+void from_graph(const Camera& from, ColmapCamera& camera) {
+  std::visit(
+      [&](const auto& c) {
+        std::copy_n(c.params.begin(), camera.params.size(), camera.params.begin());
+      },
+      from);
+  const std::size_t principal = focal_lengths(camera.kind);
+  camera.params[principal] += kFirstPixelCentre;
+  camera.params[principal + 1] += kFirstPixelCentre;
+}
+
+template <typename Id>
+using Index = std::unordered_map<Id, std::uint32_t>;
+
+template <typename Id, typename T>
+Index<Id> index_by_id(const ColmapModel& model, const std::vector<T>& items, std::string_view name,
+                      std::string_view what) {
+  Index<Id> index;
+  for (const T& item : items) {
+    if (!index.emplace(item.id, static_cast<std::uint32_t>(index.size())).second) {
+      throw model.error(name, item.place, fmt::format("{} {} is there already", what, item.id));
+    }
+  }
+  return index;
+}
+
+// The images say who sees what; a track must not contradict them.
+void check_tracks(const ColmapModel& model, const Index<std::uint32_t>& images) {
+  for (const ColmapPoint& point : model.points) {
+    for (const ColmapTrackElement& element : point.track) {
+      const auto image = images.find(element.image);
+      if (image == images.end()) {
+        throw model.error("points3D", point.place,
+                          fmt::format("the track of point {} names image {}, which there is not",
+                                      point.id, element.image));
+      }
+      const auto& seen = model.images[image->second].points;
+      if (element.point >= seen.size() || seen[element.point].point != point.id) {
+        throw model.error(
+            "points3D", point.place,
+            fmt::format("the track of point {} names point {} of image {}, which is not its",
+                        point.id, element.point, element.image));
+      }
+    }
+  }
+}
+
+void add_observations(const ColmapModel& model, const Index<std::uint64_t>& points,
+                      FactorGraph& graph) {
+  for (std::uint32_t i = 0; i < model.images.size(); ++i) {
+    const ColmapImage& image = model.images[i];
+    for (const ColmapPoint2d& seen : image.points) {
+      if (seen.point == ColmapPoint2d::kNoPoint) continue;
+      const auto point = points.find(seen.point);
+      if (point == points.end()) {
+        throw model.error(
+            "images", image.place,
+            fmt::format("image {} names point {}, which there is not", image.id, seen.point));
+      }
+      GraphObservation observation;
+      observation.frame = i;
+      observation.point = point->second;
+      observation.measurement.head<2>() = seen.pixel.array() - kFirstPixelCentre;
+      graph.observations.push_back(observation);
+    }
+  }
+}
+
+GraphFile to_graph(const ColmapModel& model) {
+  const auto cameras = index_by_id<std::uint32_t>(model, model.cameras, "cameras", "camera");
+  const auto images = index_by_id<std::uint32_t>(model, model.images, "images", "image");
+  const auto points = index_by_id<std::uint64_t>(model, model.points, "points3D", "point");
+  check_tracks(model, images);
+  check_rigs(model);
+  GraphFile file;
+  FactorGraph& graph = file.graph;
+  for (const ColmapCamera& camera : model.cameras) {
+    for (std::size_t i = 0; i < focal_lengths(camera.kind); ++i) {
+      if (!(camera.params[i] > 0)) {
+        throw model.error("cameras", camera.place, "the focal length must be positive");
+      }
+    }
+    graph.cameras.push_back(to_graph(camera));
+  }
+  for (const ColmapImage& image : model.images) {
+    const auto camera = cameras.find(image.camera);
+    if (camera == cameras.end()) {
+      throw model.error("images", image.place, fmt::format("there is no camera {}", image.camera));
+    }
+    GraphFrame frame;
+    frame.cam_from_world = image.cam_from_world;
+    frame.camera = camera->second;
+    frame.fixed = graph.frames.empty();
+    graph.frames.push_back(frame);
+    file.frame_names.push_back(image.name);
+  }
+  for (const ColmapPoint& point : model.points) {
+    graph.points.push_back({point.in_world});
+    file.point_ids.push_back(point.id);
+  }
+  add_observations(model, points, graph);
+  return file;
+}
+
+// Mean distance between a point's projections and what was seen [px].
+void update_errors(const FactorGraph& graph, ColmapModel& model) {
+  std::vector<double> sums(graph.points.size());
+  std::vector<int> counts(graph.points.size());
+  for (const GraphObservation& o : graph.observations) {
+    const GraphFrame& frame = graph.frames[o.frame];
+    const auto pixel = project(graph.cameras[frame.camera].camera,
+                               frame.cam_from_world * graph.points[o.point].in_world);
+    if (!pixel) continue;
+    sums[o.point] += (*pixel - o.measurement.head<2>()).norm();
+    ++counts[o.point];
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    model.points[i].error = counts[i] == 0 ? -1 : sums[i] / counts[i];
+  }
+}
+
+fs::path write_colmap(ColmapModel model, const FactorGraph& graph, const fs::path& out,
+                      ColmapVariant variant) {
+  for (std::size_t i = 0; i < model.cameras.size(); ++i) {
+    from_graph(graph.cameras[i].camera, model.cameras[i]);
+  }
+  for (std::size_t i = 0; i < model.images.size(); ++i) {
+    model.images[i].cam_from_world = graph.frames[i].cam_from_world;
+  }
+  for (std::size_t i = 0; i < model.points.size(); ++i) {
+    model.points[i].in_world = graph.points[i].in_world;
+  }
+  update_errors(graph, model);
+  if (model.has_rigs) update_rigs(model);
+
+  const fs::path folder = make_folder(out / "optimized");
+  remove_colmap_model(folder);  // another variant's files would be taken for the result
+  if (variant == ColmapVariant::kText) {
+    write_colmap_text(folder, model);
+  } else {
+    write_colmap_binary(folder, model);
+  }
+  return folder;
+}
+
+}  // namespace
+
+GraphFile read_colmap(const fs::path& folder, ColmapVariant variant) {
+  const bool is_text = variant == ColmapVariant::kText;
+  const auto model = std::make_shared<const ColmapModel>(is_text ? read_colmap_text(folder)
+                                                                 : read_colmap_binary(folder));
+  GraphFile file = to_graph(*model);
+  if (joins_images(*model)) {
+    file.warnings.push_back(
+        "rigs join several images; the images are optimised and written each on its own");
+  }
+  const auto add_writer = [&](ColmapVariant written) {
+    const GraphFormat format =
+        written == ColmapVariant::kText ? GraphFormat::kColmapText : GraphFormat::kColmapBinary;
+    file.writers.push_back(
+        {format, [model, written](const FactorGraph& graph, const fs::path& out) {
+           return write_colmap(*model, graph, out, written);
+         }});
+  };
+  add_writer(variant);
+  add_writer(is_text ? ColmapVariant::kBinary : ColmapVariant::kText);
+  file.format = file.writers.front().format;
+  return file;
+}
+
+}  // namespace hybrid_slam

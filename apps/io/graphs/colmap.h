@@ -1,0 +1,19 @@
+#pragma once
+
+#include "apps/io/graphs/colmap_model.h"
+#include "apps/io/graphs/graph_file.h"
+
+namespace hybrid_slam {
+
+// A COLMAP model (folder) as a graph: a frame per image, an observation per point in an image that
+// has a point in space, with the pixel origin moved to the first pixel's centre. SIMPLE_PINHOLE,
+// SIMPLE_RADIAL and RADIAL become Radial, PINHOLE Pinhole, OPENCV_FISHEYE KannalaBrandt. The first
+// image's pose is fixed; focal lengths and the distortion that a model has may be refined, shared
+// by the images of a camera, but not the principal point.
+//
+// Written back: everything that was read, with poses, cameras, points, and the points' mean errors,
+// of the estimate. Images vary on their own: where a rig's frame holds several, a warning says so,
+// and each camera is written as a rig of its own.
+GraphFile read_colmap(const std::filesystem::path& folder, ColmapVariant variant);
+
+}  // namespace hybrid_slam
