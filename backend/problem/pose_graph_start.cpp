@@ -2,7 +2,7 @@
 
 #include <limits>
 #include <queue>
-#include <tuple>
+#include <utility>
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
@@ -14,6 +14,13 @@ namespace hybrid_slam {
 namespace {
 
 constexpr double kUnreached = std::numeric_limits<double>::infinity();
+
+std::vector<Rigid3d> given_poses(const FactorGraph& graph) {
+  std::vector<Rigid3d> poses;
+  poses.reserve(graph.frames.size());
+  for (const GraphFrame& frame : graph.frames) poses.push_back(frame.cam_from_world);
+  return poses;
+}
 
 // The edges at each frame, by index, in the graph's order.
 class EdgesAtFrame {
@@ -45,34 +52,22 @@ class EdgesAtFrame {
 // Paths from the known frames outwards, shortest first (Dijkstra).
 class PathTree {
  public:
-  explicit PathTree(const FactorGraph& graph)
+  PathTree(const FactorGraph& graph, const std::vector<char>& known)
       : graph_(graph),
         at_frame_(graph),
         distance_(graph.frames.size(), kUnreached),
-        known_(graph.frames.size(), 0),
-        poses_(graph.frames.size()) {
-    for (std::size_t i = 0; i < poses_.size(); ++i) poses_[i] = graph.frames[i].cam_from_world;
+        poses_(given_poses(graph)) {
     for (std::size_t i = 0; i < poses_.size(); ++i) {
-      if (graph.frames[i].fixed) add_root(i);
+      if (!known[i]) continue;
+      distance_[i] = 0;
+      frontier_.emplace(0.0, i);
     }
     grow();
-    for (std::size_t i = 0; i < poses_.size(); ++i) {  // parts without a fixed frame
-      if (distance_[i] < kUnreached) continue;
-      add_root(i);
-      grow();
-    }
   }
 
-  const std::vector<char>& known() const { return known_; }
   const std::vector<Rigid3d>& poses() const { return poses_; }
 
  private:
-  void add_root(std::size_t frame) {
-    known_[frame] = 1;
-    distance_[frame] = 0;
-    frontier_.emplace(0.0, frame);
-  }
-
   void grow() {
     while (!frontier_.empty()) {
       const auto [distance, frame] = frontier_.top();
@@ -99,7 +94,6 @@ class PathTree {
   EdgesAtFrame at_frame_;
   std::priority_queue<Reached, std::vector<Reached>, std::greater<>> frontier_;
   std::vector<double> distance_;
-  std::vector<char> known_;
   std::vector<Rigid3d> poses_;
 };
 
@@ -111,44 +105,48 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
 }
 
 // With C the rotation of cam_from_world, an edge says C_a = R_ab C_b. False if not solved.
-bool relax_rotations(const FactorGraph& graph, const std::vector<char>& known,
+bool relax_rotations(const FactorGraph& graph, const PoseGraphStructure& structure,
                      std::vector<Rigid3d>& poses) {
   std::vector<LinearEdge<3>> edges(graph.edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const GraphEdge& edge = graph.edges[e];
-    edges[e] = {edge.a, edge.b, isotropic_weights(edge.information).rotation,
+    edges[e] = {isotropic_weights(edge.information).rotation,
                 edge.a_from_b.rotation().toRotationMatrix(), Eigen::Matrix3d::Zero()};
   }
   std::vector<Eigen::Matrix3d> rotations(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     rotations[i] = poses[i].rotation().toRotationMatrix();
   }
-  if (!solve_linear_edges<3>(edges, known, rotations)) return false;
+  if (!solve_linear_edges<3>(structure.pattern, structure.couplings, edges, rotations))
+    return false;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (!known[i]) poses[i].rotation() = Eigen::Quaterniond(nearest_rotation(rotations[i]));
+    if (!structure.known[i])
+      poses[i].rotation() = Eigen::Quaterniond(nearest_rotation(rotations[i]));
   }
   return true;
 }
 
 // With p the position of a frame in the world, an edge says p_a = p_b - C_a^T t_ab. Reads the
 // rotations of `poses` and writes their translations.
-bool solve_positions(const FactorGraph& graph, const std::vector<char>& known,
+bool solve_positions(const FactorGraph& graph, const PoseGraphStructure& structure,
                      std::vector<Rigid3d>& poses) {
   std::vector<LinearEdge<1>> edges(graph.edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const GraphEdge& edge = graph.edges[e];
     const Eigen::Vector3d a_to_b =
         poses[edge.a].rotation().conjugate() * edge.a_from_b.translation();
-    edges[e] = {edge.a, edge.b, isotropic_weights(edge.information).translation,
+    edges[e] = {isotropic_weights(edge.information).translation,
                 Eigen::Matrix<double, 1, 1>::Ones(), -a_to_b.transpose()};
   }
   std::vector<Eigen::RowVector3d> positions(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     positions[i] = origin_in_a(graph.frames[i].cam_from_world).transpose();
   }
-  if (!solve_linear_edges<1>(edges, known, positions)) return false;
+  if (!solve_linear_edges<1>(structure.pattern, structure.couplings, edges, positions))
+    return false;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (!known[i]) poses[i].translation() = -(poses[i].rotation() * positions[i].transpose());
+    if (!structure.known[i])
+      poses[i].translation() = -(poses[i].rotation() * positions[i].transpose());
   }
   return true;
 }
@@ -187,19 +185,15 @@ double isotropic_objective(const FactorGraph& graph) {
   return sum;
 }
 
-std::vector<Rigid3d> start_poses(const FactorGraph& graph, PoseGraphStart start) {
-  if (start == PoseGraphStart::kGiven) {
-    std::vector<Rigid3d> poses;
-    for (const GraphFrame& frame : graph.frames) poses.push_back(frame.cam_from_world);
-    return poses;
-  }
-  const PathTree tree(graph);
+std::vector<Rigid3d> start_poses(const FactorGraph& graph, const PoseGraphStructure& structure,
+                                 PoseGraphStart start) {
+  if (start == PoseGraphStart::kGiven) return given_poses(graph);
+  const PathTree tree(graph, structure.known);
+  if (start == PoseGraphStart::kTree) return tree.poses();
   std::vector<Rigid3d> poses = tree.poses();
-  if (start == PoseGraphStart::kTree) return poses;
-  if (relax_rotations(graph, tree.known(), poses) && solve_positions(graph, tree.known(), poses)) {
-    return poses;
-  }
-  return tree.poses();
+  const bool solved =
+      relax_rotations(graph, structure, poses) && solve_positions(graph, structure, poses);
+  return solved ? poses : tree.poses();
 }
 
 }  // namespace hybrid_slam

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "backend/problem/factor_graph.h"
+#include "backend/problem/pose_graph_structure.h"
 
 namespace hybrid_slam {
 
@@ -29,16 +30,17 @@ IsotropicWeights isotropic_weights(const Matrix6d& information);
 // F above over all edges of the graph.
 double isotropic_objective(const FactorGraph& graph);
 
-// cam_from_world of every frame, from the edges alone. In each connected part the fixed frames keep
-// their poses, or the first frame does where none is fixed; so do frames without edges.
+// cam_from_world of every frame, from the edges alone and the poses of the frames that the
+// structure names as known; frames without edges are among these.
 //
-// kTree: the tree of the shortest paths from the frames that keep their poses, an edge's length
-// being the variance of its rotation.
+// kTree: the tree of the shortest paths from the known frames, an edge's length being the variance
+// of its rotation.
 // kRotations: minimises the rotation part of F over all 3x3 matrices, a linear problem, takes the
 // nearest rotations, and minimises the translation part (Carlone et al., ICRA 2015, section III-B).
 // Exact where the measurements are. Falls back to kTree if the linear problem cannot be solved.
 //
-// Requires a valid graph.
-std::vector<Rigid3d> start_poses(const FactorGraph& graph, PoseGraphStart start);
+// Requires a valid graph, and its structure.
+std::vector<Rigid3d> start_poses(const FactorGraph& graph, const PoseGraphStructure& structure,
+                                 PoseGraphStart start);
 
 }  // namespace hybrid_slam

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "backend/problem/openmp_threads.h"
+
 namespace hybrid_slam {
 
 namespace {
@@ -137,6 +139,7 @@ SolveOutcome solve_round(FactorGraph& graph, const GraphFactors& factors,
   WatchingCallback callback(stop, progress);
   solver.callbacks.push_back(&callback);
   ceres::Solver::Summary summary;
+  allow_openmp_threads(options.threads > 1);
   ceres::Solve(solver, problem.get(), &summary);
 
   outcome.end = end_of(summary, options);
