@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
 #include <unordered_map>
 
 #include "apps/io/graphs/colmap_rigs.h"
+#include "apps/io/graphs/graph_errors.h"
 #include "apps/io/output_file.h"
 
 namespace hybrid_slam {
@@ -163,12 +166,10 @@ void update_errors(const FactorGraph& graph, ColmapModel& model) {
   std::vector<double> sums(graph.points.size());
   std::vector<int> counts(graph.points.size());
   for (const GraphObservation& o : graph.observations) {
-    const GraphFrame& frame = graph.frames[o.frame];
-    const auto pixel = project(graph.cameras[frame.camera].camera,
-                               frame.cam_from_world * graph.points[o.point].in_world);
-    if (!pixel) continue;
-    sums[o.point] += (*pixel - o.measurement.head<2>()).norm();
-    ++counts[o.point];
+    if (const auto squared = squared_error(graph, o)) {
+      sums[o.point] += std::sqrt(*squared);
+      ++counts[o.point];
+    }
   }
   for (std::size_t i = 0; i < sums.size(); ++i) {
     model.points[i].error = counts[i] == 0 ? -1 : sums[i] / counts[i];

@@ -41,7 +41,7 @@ GraphFile read_graph_file(const fs::path& path) {
 
 }  // namespace
 
-std::string_view to_string(GraphFormat format) {
+std::string_view name_of(GraphFormat format) {
   switch (format) {
     case GraphFormat::kBal:
       return "bal";

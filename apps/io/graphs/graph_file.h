@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -14,7 +15,11 @@ namespace hybrid_slam {
 
 enum class GraphFormat { kBal, kG2o, kColmapText, kColmapBinary, kStereoGraph, kStereoStream };
 
-std::string_view to_string(GraphFormat format);  // "bal", "g2o", "colmap-text", ...
+inline constexpr std::array<GraphFormat, 6> kGraphFormats{
+    GraphFormat::kBal,          GraphFormat::kG2o,         GraphFormat::kColmapText,
+    GraphFormat::kColmapBinary, GraphFormat::kStereoGraph, GraphFormat::kStereoStream};
+
+std::string_view name_of(GraphFormat format);  // "bal", "g2o", "colmap-text", ...
 
 // A way to write a graph: into `folder`, as "optimized" with the format's extension, or as a folder
 // of this name. Returns what it has written. Throws OutputError.

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxCount = std::numeric_limits<std::uint32_t>::max() - 1;
 constexpr std::uint64_t kKeyframeBytes = 30;    // at least, of a KF line
-constexpr std::uint64_t kObservationBytes = 8;  // at least, of a line
+constexpr std::uint64_t kObservationBytes = 7;  // at least, of a line
 
 struct StreamHeader {
   double f = 0, cx = 0, cy = 0, baseline = 0;

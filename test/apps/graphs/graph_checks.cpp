@@ -82,18 +82,23 @@ std::string refusal(const fs::path& path) {
 
 void check_faults(const std::string& file_name, const std::string& text,
                   const std::vector<Fault>& faults) {
+  check_faults({{file_name, text}}, file_name, file_name, faults);
+}
+
+void check_faults(const TextFiles& files, const std::string& spoiled, const fs::path& input,
+                  const std::vector<Fault>& faults) {
   const TempFolder folder;
-  const fs::path path = folder.path() / file_name;
-  write_text(path, text);
-  REQUIRE(refusal(path).empty());
+  for (const auto& [name, text] : files) write_text(folder.path() / name, text);
+  REQUIRE(refusal(folder.path() / input).empty());
+  const fs::path path = folder.path() / spoiled;
   for (const Fault& fault : faults) {
     INFO("fault: " << fault.name);
-    std::string spoiled = text;
-    const std::size_t at = spoiled.find(fault.from);
+    std::string text = files.at(spoiled);
+    const std::size_t at = text.find(fault.from);
     REQUIRE(at != std::string::npos);
-    write_text(path, spoiled.replace(at, fault.from.size(), fault.to));
-    const std::string reason = refusal(path);
-    CHECK_THAT(reason, Catch::StartsWith(path.string() + ":"));
+    write_text(path, text.replace(at, fault.from.size(), fault.to));
+    const std::string reason = refusal(folder.path() / input);
+    CHECK_THAT(reason, Catch::StartsWith(folder.path().string()));
     CHECK_THAT(reason, Catch::Contains(fault.reason));
     CHECK(reason.find('\n') == std::string::npos);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,12 @@ struct Fault {
 // with the file's name and holds the reason.
 void check_faults(const std::string& file_name, const std::string& text,
                   const std::vector<Fault>& faults);
+
+// The same with several files, by name, of which `spoiled` is spoiled; `input`, below their folder,
+// is what is read.
+using TextFiles = std::map<std::string, std::string>;
+void check_faults(const TextFiles& files, const std::string& spoiled,
+                  const std::filesystem::path& input, const std::vector<Fault>& faults);
 
 // The reason, if read_graph refuses the path with one line; empty if it takes it.
 std::string refusal(const std::filesystem::path& path);

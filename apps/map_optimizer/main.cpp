@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <csignal>
+
+#include "apps/io/output_file.h"
+#include "apps/io/report.h"
+#include "apps/map_optimizer/outputs.h"
+
+namespace hybrid_slam {
+namespace {
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
+
+// The first Ctrl-C ends the run in order; a second one kills the program as usual.
+void on_signal(int signal) {
+  interrupted = true;
+  std::signal(signal, SIG_DFL);
+}
+
+// The solver, with a line per iteration, until it ends or the user asks for it.
+GraphSummary solve(const CommandLine& line, FactorGraph& graph) {
+  std::stop_source stop;
+  return solve_graph(
+      graph, solver_options(line.options), stop.get_token(), [&](const IterationReport& report) {
+        if (interrupted) stop.request_stop();
+        if (line.quiet) return;
+        fmt::print(stderr, "iteration {:3}  cost {:<18.10g} step {:<10.3g} {:.2f} s\n",
+                   report.iteration, report.cost, report.step_norm, report.seconds);
+      });
+}
+
+// Only the estimate goes back to the file's graph: what a problem fixes or leaves out is its own.
+void take_estimate(const FactorGraph& from, FactorGraph& to) {
+  for (std::size_t i = 0; i < to.frames.size(); ++i) {
+    to.frames[i].cam_from_world = from.frames[i].cam_from_world;
+  }
+  for (std::size_t i = 0; i < to.points.size(); ++i) {
+    to.points[i].in_world = from.points[i].in_world;
+  }
+  for (std::size_t i = 0; i < to.cameras.size(); ++i) {
+    to.cameras[i].camera = from.cameras[i].camera;
+  }
+}
+
+OptimizerResult optimize(const CommandLine& line, const GraphFile& file, PhaseTimes& times) {
+  OptimizerResult result;
+  result.graph = file.graph;
+  FactorGraph problem = make_problem(file.graph, line.options, line.input);
+  result.start = choose_start(line.options, problem);
+  times.end("build");
+  result.solve = solve(line, problem);
+  if (result.solve.end != SolveEnd::kFailed) take_estimate(problem, result.graph);
+  times.end("solve");
+  result.initial_cost = cost(file.graph);
+  result.final_cost = cost(result.graph);
+  result.initial_errors = reprojection_errors(file.graph);
+  result.final_errors = reprojection_errors(result.graph);
+  times.end("evaluate");
+  return result;
+}
+
+int exit_code_of(const GraphSummary& solve) {
+  switch (solve.end) {
+    case SolveEnd::kEmpty:
+    case SolveEnd::kFailed:
+      spdlog::error("{}: {}", to_string(solve.end), solve.text);
+      return kExitNoSolution;
+    case SolveEnd::kStopped:
+      spdlog::warn("interrupted: the estimate so far is saved");
+      return kExitInterrupted;
+    default:
+      return kExitOk;
+  }
+}
+
+int run(const CommandLine& line) {
+  PhaseTimes times;
+  const GraphFile file = read_graph(line.input);
+  find_writer(line, file);  // before the work, not after: can the results be written?
+  write_file(make_folder(line.out) / "report.json", "{}\n");
+  for (const std::string& warning : file.warnings) spdlog::warn(warning);
+  if (!line.quiet) {
+    spdlog::info("{} ({}): {} frames, {} points, {} observations, {} edges", line.input,
+                 name_of(file.format), file.graph.frames.size(), file.graph.points.size(),
+                 file.graph.observations.size(), file.graph.edges.size());
+  }
+  times.end("read");
+  const OptimizerResult result = optimize(line, file, times);
+  write_graph(line, file, result);
+  times.end("write");
+  write_report(line, file, result, times);
+  if (!line.quiet) {
+    spdlog::info("cost {:.10g} -> {:.10g} in {} iterations: {}", result.initial_cost,
+                 result.final_cost, result.solve.iterations, to_string(result.solve.end));
+  }
+  return exit_code_of(result.solve);
+}
+
+int guarded_main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("map_optimizer"));
+  spdlog::set_pattern("%n: %^%l%$: %v");
+  try {
+    int exit_code = kExitOk;
+    const auto line = parse_command_line(argc, argv, exit_code);
+    if (!line) return exit_code;
+    std::signal(SIGINT, on_signal);
+    std::signal(SIGTERM, on_signal);
+    return run(*line);
+  } catch (const InputError& error) {
+    spdlog::error(error.what());
+    return kExitBadInput;
+  } catch (const OutputError& error) {
+    spdlog::error(error.what());
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    spdlog::critical("internal error: {}", error.what());
+    return kExitInternalError;
+  }
+}
+
+}  // namespace
+}  // namespace hybrid_slam
+
+int main(int argc, char** argv) { return hybrid_slam::guarded_main(argc, argv); }
