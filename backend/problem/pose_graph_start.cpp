@@ -164,6 +164,10 @@ const char* name_of(PoseGraphStart start) {
   }
 }
 
+std::vector<PoseGraphStart> all_pose_graph_starts() {
+  return {PoseGraphStart::kGiven, PoseGraphStart::kTree, PoseGraphStart::kRotations};
+}
+
 IsotropicWeights isotropic_weights(const Matrix6d& information) {
   const Eigen::Matrix3d translation = information.topLeftCorner<3, 3>();
   const Eigen::Matrix3d rotation = information.bottomRightCorner<3, 3>();
@@ -194,6 +198,10 @@ std::vector<Rigid3d> start_poses(const FactorGraph& graph, const PoseGraphStruct
   const bool solved =
       relax_rotations(graph, structure, poses) && solve_positions(graph, structure, poses);
   return solved ? poses : tree.poses();
+}
+
+std::vector<Rigid3d> start_poses(const FactorGraph& graph, PoseGraphStart start) {
+  return start_poses(graph, PoseGraphStructure(graph), start);
 }
 
 }  // namespace hybrid_slam

@@ -16,6 +16,7 @@ enum class PoseGraphStart {
 };
 
 const char* name_of(PoseGraphStart start);
+std::vector<PoseGraphStart> all_pose_graph_starts();
 
 // Weights of an edge under isotropic noise closest to its information, as in SE-Sync (Rosen et al.,
 // IJRR 2019): F = sum rotation |R_b - R_a R_ab|_F^2 + translation |t_b - t_a - R_a t_ab|^2, with R,
@@ -42,5 +43,6 @@ double isotropic_objective(const FactorGraph& graph);
 // Requires a valid graph, and its structure.
 std::vector<Rigid3d> start_poses(const FactorGraph& graph, const PoseGraphStructure& structure,
                                  PoseGraphStart start);
+std::vector<Rigid3d> start_poses(const FactorGraph& graph, PoseGraphStart start);
 
 }  // namespace hybrid_slam

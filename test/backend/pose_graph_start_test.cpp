@@ -10,10 +10,6 @@ namespace {
 
 constexpr PoseGraphStart kComputed[] = {PoseGraphStart::kTree, PoseGraphStart::kRotations};
 
-std::vector<Rigid3d> start_poses(const FactorGraph& graph, PoseGraphStart start) {
-  return start_poses(graph, PoseGraphStructure(graph), start);
-}
-
 double largest_error(const std::vector<Rigid3d>& poses, const std::vector<Rigid3d>& truth) {
   double largest = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
