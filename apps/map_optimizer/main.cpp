@@ -22,15 +22,23 @@ void on_signal(int signal) {
 }
 
 // The solver, with a line per iteration, until it ends or the user asks for it.
-GraphSummary solve(const CommandLine& line, FactorGraph& graph) {
+void solve(const CommandLine& line, FactorGraph& problem, OptimizerResult& result) {
   std::stop_source stop;
-  return solve_graph(
-      graph, solver_options(line.options), stop.get_token(), [&](const IterationReport& report) {
-        if (interrupted) stop.request_stop();
-        if (line.quiet) return;
-        fmt::print(stderr, "iteration {:3}  cost {:<18.10g} step {:<10.3g} {:.2f} s\n",
-                   report.iteration, report.cost, report.step_norm, report.seconds);
-      });
+  const auto progress = [&](const IterationReport& report) {
+    if (interrupted) stop.request_stop();
+    if (line.quiet) return;
+    fmt::print(stderr, "iteration {:3}  cost {:<18.10g} step {:<10.3g} {:.2f} s\n",
+               report.iteration, report.cost, report.step_norm, report.seconds);
+  };
+  if (is_pose_graph(problem) && line.options.loss == Loss::kNone) {
+    const PoseGraphSummary pose_graph =
+        solve_pose_graph(problem, pose_graph_options(line.options), stop.get_token(), progress);
+    result.start = pose_graph.start;
+    result.solve = pose_graph.summary;
+  } else {
+    result.start = choose_start(line.options, problem);
+    result.solve = solve_graph(problem, solver_options(line.options), stop.get_token(), progress);
+  }
 }
 
 // Only the estimate goes back to the file's graph: what a problem fixes or leaves out is its own.
@@ -50,9 +58,8 @@ OptimizerResult optimize(const CommandLine& line, const GraphFile& file, PhaseTi
   OptimizerResult result;
   result.graph = file.graph;
   FactorGraph problem = make_problem(file.graph, line.options, line.input);
-  result.start = choose_start(line.options, problem);
   times.end("build");
-  result.solve = solve(line, problem);
+  solve(line, problem, result);
   if (result.solve.end != SolveEnd::kFailed) take_estimate(problem, result.graph);
   times.end("solve");
   result.initial_cost = cost(file.graph);

@@ -1,6 +1,7 @@
 #include "apps/map_optimizer/problem.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "backend/problem/local_bundle.h"
@@ -58,6 +59,19 @@ void restrict_to_window(FactorGraph& graph) {
   for (GraphCamera& camera : graph.cameras) camera.refined = 0;
 }
 
+std::vector<PoseGraphStart> starts_of(StartChoice choice) {
+  switch (choice) {
+    case StartChoice::kGiven:
+      return {PoseGraphStart::kGiven};
+    case StartChoice::kTree:
+      return {PoseGraphStart::kTree};
+    case StartChoice::kRotations:
+      return {PoseGraphStart::kRotations};
+    default:
+      return all_pose_graph_starts();
+  }
+}
+
 }  // namespace
 
 FactorGraph make_problem(const FactorGraph& graph, const OptimizerOptions& options,
@@ -77,22 +91,8 @@ FactorGraph make_problem(const FactorGraph& graph, const OptimizerOptions& optio
 }
 
 PoseGraphStart choose_start(const OptimizerOptions& options, FactorGraph& graph) {
-  if (graph.edges.empty() || !graph.observations.empty()) return PoseGraphStart::kGiven;
-  std::vector<PoseGraphStart> starts;
-  switch (options.start) {
-    case StartChoice::kAuto:
-      starts = {PoseGraphStart::kGiven, PoseGraphStart::kTree, PoseGraphStart::kRotations};
-      break;
-    case StartChoice::kGiven:
-      starts = {PoseGraphStart::kGiven};
-      break;
-    case StartChoice::kTree:
-      starts = {PoseGraphStart::kTree};
-      break;
-    case StartChoice::kRotations:
-      starts = {PoseGraphStart::kRotations};
-      break;
-  }
+  if (!is_pose_graph(graph)) return PoseGraphStart::kGiven;
+  const std::vector<PoseGraphStart> starts = starts_of(options.start);
   const PoseGraphStructure structure(graph);
   FactorGraph best = graph;
   PoseGraphStart chosen = PoseGraphStart::kGiven;
@@ -110,6 +110,13 @@ PoseGraphStart choose_start(const OptimizerOptions& options, FactorGraph& graph)
   }
   graph = std::move(best);
   return chosen;
+}
+
+PoseGraphOptions pose_graph_options(const OptimizerOptions& options) {
+  PoseGraphOptions solver;
+  solver.starts = starts_of(options.start);
+  solver.iterations = options.iterations;
+  return solver;
 }
 
 ProblemOptions solver_options(const OptimizerOptions& options) {

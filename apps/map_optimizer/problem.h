@@ -4,8 +4,7 @@
 #include <stop_token>
 
 #include "apps/io/graphs/graph_file.h"
-#include "backend/problem/pose_graph_start.h"
-#include "backend/problem/solve_graph.h"
+#include "backend/problem/solve_pose_graph.h"
 
 namespace hybrid_slam {
 
@@ -15,7 +14,8 @@ enum class ProblemKind {
   kLocal,  // the last frame, its neighbours and what they see
 };
 
-// Where the poses of a pose graph start from; kAuto: where the cost is lowest.
+// Where the poses of a pose graph start from; kAuto: where the solution's cost is lowest or, with a
+// loss, the start's.
 enum class StartChoice { kAuto, kGiven, kTree, kRotations };
 
 struct OptimizerOptions {
@@ -37,6 +37,7 @@ FactorGraph make_problem(const FactorGraph& graph, const OptimizerOptions& optio
 // other graphs as they are.
 PoseGraphStart choose_start(const OptimizerOptions& options, FactorGraph& graph);
 
+PoseGraphOptions pose_graph_options(const OptimizerOptions& options);
 ProblemOptions solver_options(const OptimizerOptions& options);
 
 }  // namespace hybrid_slam

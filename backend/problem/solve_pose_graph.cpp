@@ -150,8 +150,7 @@ std::string PoseGraphOptions::validate() const {
 }
 
 bool is_pose_graph(const FactorGraph& graph) {
-  return graph.observations.empty() && graph.points.empty() && graph.similarities.empty() &&
-         graph.similarity_edges.empty() && !graph.edges.empty();
+  return !graph.edges.empty() && graph.observations.empty() && graph.similarity_edges.empty();
 }
 
 PoseGraphSummary solve_pose_graph(FactorGraph& graph, const PoseGraphOptions& options,

@@ -33,7 +33,7 @@ struct PoseGraphSummary {
   std::vector<PoseGraphAttempt> attempts;         // in the order in which they were made
 };
 
-// Whether solve_pose_graph can be used: a graph of edges between frames and of nothing else.
+// Whether solve_pose_graph can be used: all terms are edges between frames.
 bool is_pose_graph(const FactorGraph& graph);
 
 // Solves a pose graph from several starts, the one with the lowest cost first: Gauss-Newton

@@ -144,7 +144,7 @@ TEST_CASE("what is no pose graph is refused") {
   PoseGraphOptions none;
   none.starts.clear();
   CHECK_THROWS_AS(solve_pose_graph(test.graph, none), std::invalid_argument);
-  test.graph.points.emplace_back();
+  test.graph.observations.emplace_back();
   CHECK_FALSE(is_pose_graph(test.graph));
   CHECK_THROWS_AS(solve_pose_graph(test.graph, {}), std::invalid_argument);
 }
