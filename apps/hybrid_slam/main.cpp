@@ -9,7 +9,7 @@
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/hybrid_slam/progress.h"
-#include "apps/io/output_file.h"
+#include "cameras/output_file.h"
 #include "cameras/input_error.h"
 
 namespace hybrid_slam {

@@ -8,7 +8,7 @@
 
 #include "apps/hybrid_slam/version.h"
 #include "apps/io/map_picture.h"
-#include "apps/io/output_file.h"
+#include "cameras/output_file.h"
 #include "apps/io/ply.h"
 #include "apps/io/report.h"
 

@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/io/output_file.h"
+#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 

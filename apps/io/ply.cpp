@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string>
 
-#include "apps/io/output_file.h"
+#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 

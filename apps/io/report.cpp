@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "apps/io/output_file.h"
+#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 

@@ -5,9 +5,9 @@
 #include <atomic>
 #include <csignal>
 
-#include "apps/io/output_file.h"
 #include "apps/io/report.h"
 #include "apps/map_optimizer/outputs.h"
+#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 namespace {

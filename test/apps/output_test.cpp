@@ -1,41 +1,13 @@
-#include "apps/io/output_file.h"
+#include "apps/io/ply.h"
 
 #include <cstring>
 
 #include <catch2/catch.hpp>
 
-#include "apps/io/ply.h"
 #include "test/support/temp_folder.h"
 
 namespace hybrid_slam {
 namespace {
-
-namespace fs = std::filesystem;
-
-TEST_CASE("a file is replaced whole and nothing is left beside it") {
-  const TempFolder folder;
-  write_file(folder.path() / "a", "old");
-  write_file(folder.path() / "a", std::string(1 << 20, 'x'));
-  CHECK(read_text(folder.path() / "a") == std::string(1 << 20, 'x'));
-  CHECK(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()) == 1);
-}
-
-TEST_CASE("what cannot be written throws one line with the name, and leaves nothing behind") {
-  const TempFolder folder;
-  const auto refused = [](const fs::path& path) {
-    try {
-      write_file(path, "text");
-    } catch (const OutputError& error) {
-      const std::string line = error.what();
-      return line.find(path.string()) == 0 && line.find('\n') == std::string::npos;
-    }
-    return false;
-  };
-  CHECK(refused(folder.path() / "missing" / "a"));
-  fs::create_directory(folder.path() / "folder");
-  CHECK(refused(folder.path() / "folder"));
-  CHECK(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()) == 1);
-}
 
 TEST_CASE("a PLY file has a header and fifteen bytes per point") {
   const TempFolder folder;
