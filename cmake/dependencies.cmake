@@ -13,6 +13,8 @@ find_library(BLAS_LIBRARY blas REQUIRED)
 
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(hwy REQUIRED IMPORTED_TARGET libhwy)
+pkg_check_modules(xxhash REQUIRED IMPORTED_TARGET libxxhash)
+pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
 
 find_path(OPENGV_INCLUDE_DIR opengv/types.hpp REQUIRED)
 find_library(OPENGV_LIBRARY opengv REQUIRED)

@@ -38,6 +38,8 @@ class Map {
   std::vector<std::string> check_consistency() const;
 
  private:
+  friend struct MapFileAccess;  // backend/map/map_file_format.h
+
   MapSnapshot view_;
 };
 

@@ -45,6 +45,7 @@ class MapSnapshot {
 
  private:
   friend class Map;
+  friend struct MapFileAccess;  // backend/map/map_file_format.h
   explicit MapSnapshot(MapTables tables) : tables_(std::move(tables)) {}
 
   MapTables tables_;

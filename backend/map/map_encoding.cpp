@@ -1,0 +1,129 @@
+#include "backend/map/map_encoding.h"
+
+#include <variant>
+
+#include "backend/map/byte_stream.h"
+#include "backend/map/map_file_format.h"
+
+namespace hybrid_slam {
+
+namespace {
+
+constexpr std::size_t kChunkSize = std::size_t{1} << 22;  // a section ends beyond it [bytes]
+
+void write(ByteWriter& out, const Rigid3d& pose) {
+  for (const double value : pose.params) out.number(value);
+}
+
+void write(ByteWriter& out, const Eigen::Vector3d& vector) {
+  for (const double value : vector) out.number(value);
+}
+
+void write(ByteWriter& out, const Camera& camera) {
+  out.text(model_name(camera));
+  out.number(image_width(camera));
+  out.number(image_height(camera));
+  std::visit(
+      [&](const auto& calibrated) {
+        out.number(static_cast<std::uint32_t>(calibrated.params.size()));
+        for (const double value : calibrated.params) out.number(value);
+      },
+      camera);
+}
+
+// Column by column: neighbours are alike, which compresses better.
+void write(ByteWriter& out, const FrameObservations& frame) {
+  out.number(frame.camera.value);
+  out.number(frame.frame_index);
+  out.number(frame.time);
+  out.number(static_cast<std::uint8_t>(frame.features.kind));
+  out.number(std::uint8_t{!frame.u_right.empty()});
+  out.number(static_cast<std::uint32_t>(frame.size()));
+  for (const auto member : {&Keypoint::x, &Keypoint::y, &Keypoint::scale, &Keypoint::angle,
+                            &Keypoint::response, &Keypoint::sigma}) {
+    for (const Keypoint& keypoint : frame.features.keypoints) out.number(keypoint.*member);
+  }
+  for (const float u : frame.u_right) out.number(u);
+  for (const Descriptor& descriptor : frame.features.descriptors) {
+    out.bytes({reinterpret_cast<const char*>(descriptor.data()), descriptor.size()});
+  }
+}
+
+// Landmarks, covisible keyframes and children follow from what else is written.
+void write(ByteWriter& out, const Keyframe& keyframe) {
+  out.number(keyframe.id.value);
+  out.number(keyframe.parent.value);
+  out.number(std::uint8_t{keyframe.keep});
+  write(out, keyframe.cam_from_world);
+  write(out, *keyframe.observations);
+}
+
+// The descriptor is that of one of the observations and follows from them; the numbers would too,
+// but only a machine that rounds alike finds the same ones again.
+void write(ByteWriter& out, const Landmark& landmark) {
+  out.number(landmark.id.value);
+  write(out, landmark.point_in_world);
+  out.number(landmark.reference.value);
+  write(out, landmark.mean_direction);
+  out.number(landmark.object_scale);
+  out.number(landmark.visible);
+  out.number(landmark.found);
+  out.number(static_cast<std::uint32_t>(landmark.observations.size()));
+  for (const Observation& observation : landmark.observations) {
+    out.number(observation.keyframe.value);
+    out.number(observation.keypoint);
+  }
+}
+
+// The values of a table, in as many sections as it takes.
+template <typename T, typename WriteOne>
+void encode_table(const PersistentTable<T>& table, std::string_view section,
+                  SectionFileWriter& file, WriteOne&& write_one) {
+  ByteWriter out;
+  const auto end_section = [&] {
+    if (!out.content().empty()) file.add(section, out.content());
+    out.clear();
+  };
+  table.for_each([&](std::uint64_t index, const T& value) {
+    write_one(out, index, value);
+    if (out.content().size() > kChunkSize) end_section();
+  });
+  end_section();
+}
+
+}  // namespace
+
+void encode_map(const MapTables& tables, const MapFileInfo& info, SectionFileWriter& file) {
+  ByteWriter texts;
+  texts.text(info.program);
+  texts.text(info.options);
+  file.add(kInfoSection, texts.content());
+
+  ByteWriter cameras;
+  for (const Camera& camera : tables.cameras) write(cameras, camera);
+  file.add(kCamerasSection, cameras.content());
+
+  ByteWriter state;
+  state.number(tables.origin.value);
+  state.number(tables.next_keyframe);
+  state.number(tables.next_landmark);
+  state.number(tables.newest_frame_index);
+  for (const std::size_t size :
+       {tables.keyframes.size(), tables.erased.size(), tables.landmarks.size()}) {
+    state.number(static_cast<std::uint32_t>(size));
+  }
+  file.add(kStateSection, state.content());
+
+  encode_table(tables.keyframes, kKeyframesSection, file,
+               [](ByteWriter& out, std::uint64_t, const Keyframe& k) { write(out, k); });
+  encode_table(tables.erased, kErasedSection, file,
+               [](ByteWriter& out, std::uint64_t index, const ErasedKeyframe& erased) {
+                 out.number(static_cast<std::uint32_t>(index));
+                 out.number(erased.parent.value);
+                 write(out, erased.cam_from_parent);
+               });
+  encode_table(tables.landmarks, kLandmarksSection, file,
+               [](ByteWriter& out, std::uint64_t, const Landmark& l) { write(out, l); });
+}
+
+}  // namespace hybrid_slam

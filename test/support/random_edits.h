@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+#include "test/support/filled_map.h"
+#include "test/support/random.h"
+
+namespace hybrid_slam {
+
+// Makes edits at random, half of what they name being stale or clashing. The same seed makes the
+// same edits on the same map.
+class RandomEdits {
+ public:
+  RandomEdits(FilledMap& filled, std::uint64_t seed) : filled_(filled), random_(seed) {}
+
+  void step();
+
+ private:
+  KeyframeId keyframe();
+  LandmarkId landmark();
+  Observation observation();
+  LandmarkObservation existing();
+  void add_keyframe();
+  void move();
+
+  FilledMap& filled_;
+  Random random_;
+};
+
+}  // namespace hybrid_slam
