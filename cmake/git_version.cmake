@@ -1,4 +1,4 @@
-# cmake -D SOURCE=... -D TEMPLATE=... -D OUTPUT=... -P git_version.cmake
+# cmake -D SOURCE=... -D HYBRID_SLAM_VERSION=... -D TEMPLATE=... -D OUTPUT=... -P git_version.cmake
 execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12
   OUTPUT_VARIABLE HYBRID_SLAM_GIT_COMMIT OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 if(NOT HYBRID_SLAM_GIT_COMMIT)

@@ -13,6 +13,7 @@ namespace {
 constexpr const char* kFooter = R"(Writes to DIR:
   stereo.tum         every tracked frame, final estimate (world_from_cam of the left camera)
   stereo_online.tum  the estimate at the moment each frame was tracked
+  map.hslam          the whole map, to go on with (docs/map_file.md)
   map.ply, map.png   landmarks and keyframes; map and path from above and from the side
   timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
   summary.json       frames, keyframes, landmarks, options, and ATE where the dataset has truth
@@ -84,6 +85,9 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       ->check(CLI::Range(1, 256).description(""));
   app.add_option("--limit", line.limit, "process so many frames at most")
       ->check(CLI::PositiveNumber.description(""));
+  app.add_option("--checkpoint-every", line.checkpoint_every,
+                 "write map.hslam on the way, every so many keyframes")
+      ->check(CLI::Range(1, 1000000).description(""));
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
   try {
     app.parse(argc, argv);

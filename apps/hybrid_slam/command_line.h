@@ -21,6 +21,7 @@ struct CommandLine {
   double rate = 0;  // [Hz]; 0: images wait for the pipeline
   int threads = 0;  // 0: one per core
   std::size_t limit = 0;
+  int checkpoint_every = 0;  // keyframes; 0: never
   bool quiet = false;
   SlamOptions options;
 };

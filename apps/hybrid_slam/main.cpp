@@ -9,8 +9,8 @@
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/hybrid_slam/progress.h"
-#include "cameras/output_file.h"
 #include "cameras/input_error.h"
+#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -27,6 +27,16 @@ void on_signal(int signal) {
 // Before hours of work, not after: can the results be written?
 void make_output_folder(const std::string& folder) {
   write_file(make_folder(folder) / "summary.json", "{}\n");
+}
+
+// What went wrong; the run goes on, and the older checkpoint is still there.
+std::string checkpoint(const CommandLine& line, const MapSnapshot& map) {
+  try {
+    write_map(line, map);
+  } catch (const OutputError& error) {
+    return error.what();
+  }
+  return {};
 }
 
 int run(const CommandLine& line) {
@@ -48,10 +58,12 @@ int run(const CommandLine& line) {
     spdlog::warn(text);
   };
   hooks.cancelled = &interrupted;
+  hooks.checkpoint = [&](const MapSnapshot& map) { return checkpoint(line, map); };
   RunOptions options;
   options.threads = line.threads;
   options.limit = line.limit;
   options.rate = line.rate;
+  options.checkpoint_every = line.checkpoint_every;
 
   const ImageFrameSource source(*sequence, line.options);
   const auto start = std::chrono::steady_clock::now();

@@ -8,9 +8,9 @@
 
 #include "apps/hybrid_slam/version.h"
 #include "apps/io/map_picture.h"
-#include "cameras/output_file.h"
 #include "apps/io/ply.h"
 #include "apps/io/report.h"
+#include "backend/map/map_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -122,6 +122,12 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
 
 }  // namespace
 
+void write_map(const CommandLine& line, const MapSnapshot& map) {
+  save_map(
+      std::filesystem::path(line.out) / "map.hslam", map,
+      {fmt::format("hybrid_slam {} ({})", kVersion, kGitCommit), write_slam_options(line.options)});
+}
+
 RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
                          const RunResult& result, double seconds) {
   const std::filesystem::path out = line.out;
@@ -136,6 +142,7 @@ RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
                     make_picture(sequence, result, trajectories.final_estimate, summary.ate));
   write_json(out / "timing.json", to_json(result.times));
   write_json(out / "summary.json", summary_json(line, sequence, result, summary));
+  write_map(line, *result.map);  // the largest: where the disk gets full, the others are there
   return summary;
 }
 

@@ -12,6 +12,9 @@ struct RunSummary {
   std::optional<AbsoluteError> ate;  // where the dataset has truth; SE3 alignment
 };
 
+// Writes the map into line.out. Throws OutputError.
+void write_map(const CommandLine& line, const MapSnapshot& map);
+
 // Writes every file of the run into line.out. Throws OutputError.
 RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
                          const RunResult& result, double seconds);

@@ -8,6 +8,18 @@
 #include "apps/pipeline/slam_run.h"
 
 namespace hybrid_slam {
+namespace {
+
+void save_checkpoint(const RunHooks& hooks, RunResult& result, Recorder& recorder) {
+  StageClock clock(result.times);
+  const std::string failure = hooks.checkpoint(*result.map);
+  clock.lap("checkpoint");
+  if (!failure.empty()) {
+    recorder.warn({failure});
+  }
+}
+
+}  // namespace
 
 RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
                           const RunOptions& run, const RunHooks& hooks) {
@@ -19,6 +31,7 @@ RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
   result.map = mapping.snapshot();
   const auto publish = [&] { result.map = mapping.snapshot(); };
   MapEdit counts;
+  int keyframes = 0;
 
   OrderedLoader loader(source, run.threads, [next = std::size_t{0}, total]() mutable {
     return next < total ? std::optional(next++) : std::nullopt;
@@ -41,6 +54,10 @@ RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
       const MappingJob job{std::move(*tracked.keyframe), std::exchange(counts, {})};
       recorder.became_keyframe(tracked.frame_index,
                                mapping.process(job, result.times, {}, publish));
+      ++keyframes;
+      if (run.checkpoint_every > 0 && keyframes % run.checkpoint_every == 0) {
+        save_checkpoint(hooks, result, recorder);
+      }
     }
   }
   loader.stop();

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "apps/pipeline/channel.h"
+#include "apps/pipeline/checkpoint_worker.h"
 #include "apps/pipeline/local_mapping.h"
 #include "apps/pipeline/ordered_loader.h"
 #include "apps/pipeline/recorder.h"
@@ -23,7 +24,8 @@ constexpr std::size_t kImageBacklog = 2;    // images waiting for the pipeline, 
 // Local mapping in its own thread. Keyframes go in, snapshots come out.
 class MappingWorker {
  public:
-  explicit MappingWorker(LocalMapping& mapping) : mapping_(mapping), jobs_(kMappingBacklog) {
+  MappingWorker(LocalMapping& mapping, CheckpointWorker& checkpoints)
+      : mapping_(mapping), checkpoints_(checkpoints), jobs_(kMappingBacklog) {
     snapshots_.publish(mapping_.snapshot());
     thread_ = std::jthread([this] { work(); });
   }
@@ -83,6 +85,7 @@ class MappingWorker {
         }
         const std::int64_t frame = job->keyframe.observations->frame_index;
         keyframes_.emplace_back(frame, mapping_.process(*job, times_, stop.get_token(), publish));
+        checkpoints_.keyframe_added(snapshots_.get());
       }
     } catch (...) {
       failure_ = std::current_exception();
@@ -92,6 +95,7 @@ class MappingWorker {
   }
 
   LocalMapping& mapping_;
+  CheckpointWorker& checkpoints_;
   Channel<MappingJob> jobs_;
   Latest<MapSnapshot> snapshots_;
   std::mutex mutex_;
@@ -144,10 +148,11 @@ class PacedCamera {
 // Tracks in the calling thread until the images end or the run is cancelled. Images that come at
 // their own pace press for time; others wait for tracking, which waits for mapping, so that it is
 // never more than one keyframe ahead.
-void track_all(OrderedLoader& loader, StereoTracker& tracker, MappingWorker& mapping, bool paced,
-               Recorder& recorder, StageTimes& times) {
+void track_all(OrderedLoader& loader, StereoTracker& tracker, MappingWorker& mapping,
+               CheckpointWorker& checkpoints, bool paced, Recorder& recorder, StageTimes& times) {
   MapEdit counts;
   while (!recorder.cancelled()) {
+    recorder.warn(checkpoints.take_failures());
     auto loaded = loader.next();
     if (!loaded) {
       break;
@@ -190,7 +195,8 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
   LocalMapping local_mapping(options);
   StereoTracker tracker(local_mapping.add_camera(source.camera()), source.camera(),
                         options.tracking);
-  MappingWorker mapping(local_mapping);
+  CheckpointWorker checkpoints(hooks.checkpoint, run.checkpoint_every);
+  MappingWorker mapping(local_mapping, checkpoints);
   std::optional<PacedCamera> camera;
   if (run.rate > 0) {
     camera.emplace(total, run.rate);
@@ -203,7 +209,7 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
                          return next < total ? std::optional(next++) : std::nullopt;
                        });
   try {
-    track_all(loader, tracker, mapping, camera.has_value(), recorder, result.times);
+    track_all(loader, tracker, mapping, checkpoints, camera.has_value(), recorder, result.times);
   } catch (...) {
     if (camera) {
       camera->finish();  // a loader may be waiting for it
@@ -217,11 +223,15 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
   loader.join();
   mapping.finish();
   mapping.rethrow();
+  checkpoints.finish();
+  checkpoints.rethrow();
+  recorder.warn(checkpoints.take_failures());
   for (const auto& [frame, id] : mapping.keyframes()) {
     recorder.became_keyframe(frame, id);
   }
   result.times.merge(loader.times());
   result.times.merge(mapping.times());
+  result.times.merge(checkpoints.times());
   result.map = local_mapping.snapshot();
   return result;
 }

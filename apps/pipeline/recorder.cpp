@@ -12,10 +12,16 @@ Rigid3d RunResult::cam_from_world(const FrameRecord& record) const {
 void Recorder::corrupt(const std::string& reason) {
   ++result_.frames.read;
   ++result_.frames.corrupt;
-  if (hooks_.warning) {
-    hooks_.warning(reason);
-  }
+  warn({reason});
   report();
+}
+
+void Recorder::warn(const std::vector<std::string>& texts) {
+  for (const std::string& text : texts) {
+    if (hooks_.warning) {
+      hooks_.warning(text);
+    }
+  }
 }
 
 void Recorder::tracked(const TrackedFrame& frame, const MapSnapshot& map) {

@@ -16,6 +16,7 @@ class Recorder {
   }
 
   void corrupt(const std::string& reason);
+  void warn(const std::vector<std::string>& texts);
   void dropped(int count) { result_.frames.dropped += count; }
   void tracked(const TrackedFrame& frame, const MapSnapshot& map);
   void became_keyframe(std::int64_t frame_index, KeyframeId id);

@@ -13,7 +13,7 @@
 namespace hybrid_slam {
 namespace {
 
-// One mapping of the file: every key that fields() names may appear in it, and no other.
+// One mapping of the file: every key that fields_of() names may appear in it, and no other.
 class Section {
  public:
   Section(const std::string& path, const std::string& name, const YAML::Node& node)
@@ -69,7 +69,32 @@ class Section {
   std::map<std::string, bool> known_;
 };
 
-void read_sift(Section section, SiftOptions& options) {
+// The same, to be written: takes the value of every field.
+class WrittenSection {
+ public:
+  explicit WrittenSection(const YAML::Node& node) : node_(node) {}
+
+  template <typename T>
+  WrittenSection& field(const char* key, const T& value) {
+    node_[key] = value;
+    return *this;
+  }
+
+  WrittenSection section(const char* key) {
+    const YAML::Node below(YAML::NodeType::Map);
+    node_[key] = below;
+    return WrittenSection(below);
+  }
+
+  void refuse_unknown() const {}
+
+ private:
+  YAML::Node node_;  // shares its content with those it was copied from
+};
+
+// What there is to be set, for both kinds of section.
+template <typename S>
+void fields_of(S section, SiftOptions& options) {
   section.field("octave_layers", options.octave_layers)
       .field("contrast_threshold", options.contrast_threshold)
       .field("edge_threshold", options.edge_threshold)
@@ -79,7 +104,8 @@ void read_sift(Section section, SiftOptions& options) {
       .refuse_unknown();
 }
 
-void read_stereo(Section section, StereoMatcherOptions& options) {
+template <typename S>
+void fields_of(S section, StereoMatcherOptions& options) {
   section.field("max_row_difference", options.max_row_difference)
       .field("min_disparity", options.min_disparity)
       .field("max_descriptor_distance", options.max_descriptor_distance)
@@ -90,7 +116,8 @@ void read_stereo(Section section, StereoMatcherOptions& options) {
       .refuse_unknown();
 }
 
-void read_keyframes(Section section, KeyframePolicyOptions& options) {
+template <typename S>
+void fields_of(S section, KeyframePolicyOptions& options) {
   section.field("min_tracked_ratio", options.min_tracked_ratio)
       .field("min_tracked_ratio_young", options.min_tracked_ratio_young)
       .field("min_inliers", options.min_inliers)
@@ -101,7 +128,8 @@ void read_keyframes(Section section, KeyframePolicyOptions& options) {
       .refuse_unknown();
 }
 
-void read_odometer(Section section, StereoOdometerOptions& options) {
+template <typename S>
+void fields_of(S section, StereoOdometerOptions& options) {
   section.field("ransac_iterations", options.ransac_iterations)
       .field("inlier_threshold", options.inlier_threshold)
       .field("min_inliers", options.min_inliers)
@@ -109,7 +137,8 @@ void read_odometer(Section section, StereoOdometerOptions& options) {
       .refuse_unknown();
 }
 
-void read_disparity(Section section, DisparityCalibratorOptions& options) {
+template <typename S>
+void fields_of(S section, DisparityCalibratorOptions& options) {
   section.field("enabled", options.enabled)
       .field("prior_sigma", options.prior_sigma)
       .field("min_significance", options.min_significance)
@@ -117,7 +146,8 @@ void read_disparity(Section section, DisparityCalibratorOptions& options) {
       .refuse_unknown();
 }
 
-void read_refinement(Section section, TrackRefinementOptions& options) {
+template <typename S>
+void fields_of(S section, TrackRefinementOptions& options) {
   section.field("enabled", options.enabled)
       .field("keyframes", options.keyframes)
       .field("sigma", options.sigma)
@@ -125,11 +155,12 @@ void read_refinement(Section section, TrackRefinementOptions& options) {
       .refuse_unknown();
 }
 
-void read_tracking(Section section, StereoTrackerOptions& options) {
-  read_odometer(section.section("odometer"), options.odometer);
-  read_disparity(section.section("disparity"), options.disparity);
-  read_keyframes(section.section("keyframes"), options.keyframes);
-  read_refinement(section.section("refinement"), options.refinement);
+template <typename S>
+void fields_of(S section, StereoTrackerOptions& options) {
+  fields_of(section.section("odometer"), options.odometer);
+  fields_of(section.section("disparity"), options.disparity);
+  fields_of(section.section("keyframes"), options.keyframes);
+  fields_of(section.section("refinement"), options.refinement);
   section.section("matcher")
       .field("max_descriptor_distance", options.matcher.max_descriptor_distance)
       .field("ratio", options.matcher.ratio)
@@ -156,7 +187,8 @@ void read_tracking(Section section, StereoTrackerOptions& options) {
       .refuse_unknown();
 }
 
-void read_triangulation(Section section, TriangulationOptions& options) {
+template <typename S>
+void fields_of(S section, TriangulationOptions& options) {
   section.field("stereo_neighbours", options.stereo_neighbours)
       .field("mono_neighbours", options.mono_neighbours)
       .field("min_baseline_ratio", options.min_baseline_ratio)
@@ -168,7 +200,8 @@ void read_triangulation(Section section, TriangulationOptions& options) {
       .refuse_unknown();
 }
 
-void read_fusion(Section section, FusionOptions& options) {
+template <typename S>
+void fields_of(S section, FusionOptions& options) {
   section.field("neighbours", options.neighbours)
       .field("second_neighbours", options.second_neighbours)
       .field("radius", options.radius)
@@ -177,7 +210,8 @@ void read_fusion(Section section, FusionOptions& options) {
       .refuse_unknown();
 }
 
-void read_culling(Section section, CullingOptions& options) {
+template <typename S>
+void fields_of(S section, CullingOptions& options) {
   section.field("min_found_ratio", options.min_found_ratio)
       .field("min_observations", options.min_observations)
       .field("probation", options.probation)
@@ -185,6 +219,17 @@ void read_culling(Section section, CullingOptions& options) {
       .field("redundant_observers", options.redundant_observers)
       .field("close_baselines", options.close_baselines)
       .refuse_unknown();
+}
+
+template <typename S>
+void fields_of(S top, SlamOptions& options) {
+  fields_of(top.section("sift"), options.sift);
+  fields_of(top.section("stereo"), options.stereo);
+  fields_of(top.section("tracking"), options.tracking);
+  fields_of(top.section("triangulation"), options.triangulation);
+  fields_of(top.section("fusion"), options.fusion);
+  fields_of(top.section("culling"), options.culling);
+  top.field("features", options.features).field("seed", options.seed).refuse_unknown();
 }
 
 }  // namespace
@@ -222,20 +267,19 @@ SlamOptions read_slam_options(const std::string& path) {
     throw InputError(path + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
   }
   SlamOptions options;
-  Section top(path, "", root);
-  read_sift(top.section("sift"), options.sift);
-  read_stereo(top.section("stereo"), options.stereo);
-  read_tracking(top.section("tracking"), options.tracking);
-  read_triangulation(top.section("triangulation"), options.triangulation);
-  read_fusion(top.section("fusion"), options.fusion);
-  read_culling(top.section("culling"), options.culling);
-  top.field("features", options.features).field("seed", options.seed).refuse_unknown();
+  fields_of(Section(path, "", root), options);
   options.distribute();
   const std::string error = options.validate();
   if (!error.empty()) {
     throw InputError(path + ": " + error);
   }
   return options;
+}
+
+std::string write_slam_options(SlamOptions options) {
+  const YAML::Node root(YAML::NodeType::Map);
+  fields_of(WrittenSection(root), options);
+  return YAML::Dump(root) + "\n";
 }
 
 }  // namespace hybrid_slam

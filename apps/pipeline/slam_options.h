@@ -36,4 +36,7 @@ struct SlamOptions {
 // unknown key, a value of the wrong type, or one out of range.
 SlamOptions read_slam_options(const std::string& path);
 
+// All options as read_slam_options() reads them, exactly.
+std::string write_slam_options(SlamOptions options);
+
 }  // namespace hybrid_slam

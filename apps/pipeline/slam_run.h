@@ -20,6 +20,7 @@ struct RunOptions {
   std::size_t limit = 0;  // frames to process at most; 0: all
   // Realtime: images per second, dropped when the pipeline is behind; 0: they wait for it.
   double rate = 0;
+  int checkpoint_every = 0;  // keyframes: so often the map is saved on the way; 0: never
 };
 
 struct FrameCounts {
@@ -50,6 +51,10 @@ struct RunHooks {
   std::function<void(const RunProgress&)> progress;  // after each frame, in the calling thread
   std::function<void(const std::string&)> warning;   // one line each
   const std::atomic<bool>* cancelled = nullptr;
+  // Saves the map so far and returns what went wrong, empty if nothing did: that is a warning and
+  // the run goes on. Every-frame: in the calling thread; realtime: in another, one call at a time,
+  // and maps that come meanwhile are left out but for the last.
+  std::function<std::string(const MapSnapshot&)> checkpoint;
 };
 
 struct RunResult {

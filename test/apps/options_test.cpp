@@ -122,5 +122,25 @@ TEST_CASE("docs/options.md gives the defaults") {
 #undef SAME
 }
 
+TEST_CASE("written options are read again exactly, every key of them") {
+  SlamOptions options;
+  options.features = 1234;
+  options.seed = ~std::uint64_t{0};
+  options.stereo.ratio = 1.0 / 3;
+  options.sift.upsample = false;
+  options.tracking.refinement.sigma = 0.1;
+  const std::string text = write_slam_options(options);
+  const TempFolder folder;
+  write_text(folder.path() / "options.yaml", text);
+  const SlamOptions read = read_slam_options((folder.path() / "options.yaml").string());
+  CHECK(read.features == 1234);
+  CHECK(read.seed == ~std::uint64_t{0});
+  CHECK(read.stereo.ratio == 1.0 / 3);
+  CHECK_FALSE(read.sift.upsample);
+  CHECK(write_slam_options(read) == text);
+  const std::string keys = "(?:^|\\n) *([a-z0-9_]+):";
+  CHECK(count_words(text, keys) == count_words(documented_options(), keys));
+}
+
 }  // namespace
 }  // namespace hybrid_slam

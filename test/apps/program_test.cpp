@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr double kMaxAte = 0.003;  // [m]; the path is 1.6 m long, the ground 2 m away
-constexpr const char* kResults[] = {"stereo.tum", "stereo_online.tum", "map.ply",
+constexpr const char* kResults[] = {"stereo.tum", "stereo_online.tum", "map.hslam",   "map.ply",
                                     "map.png",    "timing.json",       "summary.json"};
 
 void check_frames(const Json& summary, int read, int tracked, int corrupt = 0) {
@@ -132,7 +132,7 @@ TEST_CASE("every-frame runs give the same bytes, whatever the number of threads"
         run_slam(folder.path(), "data", {"--quiet", "--threads", threads, "--out", threads}).code ==
         0);
   }
-  for (const char* const file : {"stereo.tum", "stereo_online.tum", "map.ply"}) {
+  for (const char* const file : {"stereo.tum", "stereo_online.tum", "map.ply", "map.hslam"}) {
     INFO(file);
     CHECK(read_text(folder.path() / "1" / file) == read_text(folder.path() / "3" / file));
   }
@@ -254,9 +254,10 @@ TEST_CASE("help is printed, with layouts, results and exit codes") {
   const Outcome outcome = run_program(HYBRID_SLAM, {"--help"}, folder.path());
   CHECK(outcome.code == 0);
   CHECK(outcome.err.empty());
-  for (const char* const word : {"--layout", "--sequence", "--config", "--out", "--mode", "--rate",
-                                 "--cameras", "--features", "--seed", "--threads", "--limit",
-                                 "--quiet", "stereo_online.tum", "Exit codes", "130"}) {
+  for (const char* const word :
+       {"--layout", "--sequence", "--config", "--out", "--mode", "--rate", "--cameras",
+        "--features", "--seed", "--threads", "--limit", "--checkpoint-every", "--quiet",
+        "stereo_online.tum", "Exit codes", "130"}) {
     INFO(word);
     CHECK(outcome.out.find(word) != std::string::npos);
   }
