@@ -52,7 +52,6 @@ TEST_CASE("checkpoints change nothing of the result") {
     INFO(file);
     CHECK(read_text(folder.path() / "without" / file) == read_text(folder.path() / "with" / file));
   }
-  const nlohmann::json summary = read_json(folder.path() / "with/summary.json");
   const nlohmann::json timing = read_json(folder.path() / "with/timing.json");
   CHECK(timing["checkpoint"]["count"] == timing["insert_keyframe"]["count"]);
   CHECK_FALSE(read_json(folder.path() / "without/timing.json").contains("checkpoint"));
