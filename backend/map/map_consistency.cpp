@@ -130,19 +130,28 @@ class ConsistencyCheck {
     tables_.erased.for_each([&](std::uint64_t index, const ErasedKeyframe& erased) {
       expect(tables_.keyframes.find(index) == nullptr, "keyframe", index, "erased and alive");
       expect(erased.cam_from_parent.params.allFinite(), "keyframe", index, "tombstone not finite");
-      KeyframeId id = erased.parent;
-      std::size_t steps = 0;
-      while (steps <= tables_.erased.size() && find(id) == nullptr) {
-        const ErasedKeyframe* next = tables_.erased.find(id.value);
-        if (next == nullptr) break;
-        id = next->parent;
-        ++steps;
-      }
-      expect(find(id) != nullptr, "keyframe", index, "tombstone leads nowhere");
+      expect(leads_home(KeyframeId(static_cast<std::uint32_t>(index))), "keyframe", index,
+             "tombstone leads nowhere");
     });
   }
 
+  // Whether the parents' parents of an erased keyframe end at a living one. Each step is taken once
+  // in all, however long the chains.
+  bool leads_home(KeyframeId id) {
+    std::vector<KeyframeId> way;
+    while (tables_.erased.find(id.value) != nullptr && !leads_home_.contains(id)) {
+      way.push_back(id);
+      leads_home_[id] = false;  // met again, it is a circle
+      id = tables_.erased.find(id.value)->parent;
+    }
+    const auto known = leads_home_.find(id);
+    const bool home = known != leads_home_.end() ? known->second : find(id) != nullptr;
+    for (const KeyframeId passed : way) leads_home_[passed] = home;
+    return home;
+  }
+
   const MapTables& tables_;
+  std::map<KeyframeId, bool> leads_home_;  // of erased keyframes
   std::vector<std::string> faults_;
 };
 

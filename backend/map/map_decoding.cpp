@@ -54,7 +54,8 @@ void read_model(ByteReader& in, const std::string& name, std::optional<Camera>& 
   C calibrated;
   calibrated.width = in.number<int>();
   calibrated.height = in.number<int>();
-  if (calibrated.width <= 0 || calibrated.height <= 0) in.fail("camera without an image size");
+  // 0: not every calibration or graph file tells the size.
+  if (calibrated.width < 0 || calibrated.height < 0) in.fail("camera of negative image size");
   if (in.number<std::uint32_t>() != calibrated.params.size()) {
     in.fail("camera with another number of parameters than its model's");
   }

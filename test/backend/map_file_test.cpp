@@ -6,6 +6,7 @@
 #include "test/backend/same_map.h"
 #include "test/support/random_edits.h"
 #include "test/support/temp_folder.h"
+#include "test/support/test_cameras.h"
 
 namespace hybrid_slam {
 namespace {
@@ -58,6 +59,18 @@ TEST_CASE("an empty map comes back, with cameras and without") {
   LoadedMap loaded = check_round_trip(map);
   CHECK(loaded.map.view().newest_frame_index() == -1);
   CHECK(loaded.map.add_camera(synthetic_stereo_camera(0.1)) == CameraId(1));
+}
+
+template <std::size_t... kModel>
+void add_every_camera(Map& map, std::index_sequence<kModel...>) {
+  (map.add_camera(TestCamera<typename std::variant_alternative_t<kModel, Camera>::Model>::camera()),
+   ...);
+}
+
+TEST_CASE("every camera model comes back") {
+  Map map;
+  add_every_camera(map, std::make_index_sequence<std::variant_size_v<Camera>>());
+  CHECK(check_round_trip(map).map.view().camera_count() == std::variant_size_v<Camera>);
 }
 
 TEST_CASE("a map continued from a load becomes the one that was never saved") {
