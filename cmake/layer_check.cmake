@@ -4,15 +4,16 @@
 
 cmake_minimum_required(VERSION 3.25)
 
-set(rooms cameras/geometry cameras factors backend/map backend/problem backend frontend apps)
+set(rooms cameras/geometry cameras factors backend/map backend/problem backend/incremental backend frontend apps)
 set(allowed_cameras/geometry "")
 set(allowed_cameras cameras/geometry)
 set(allowed_factors cameras cameras/geometry)
 set(allowed_backend/map cameras cameras/geometry)
 set(allowed_backend/problem backend/map factors cameras cameras/geometry)
-set(allowed_backend backend/problem backend/map factors cameras cameras/geometry)
+set(allowed_backend/incremental backend/problem backend/map factors cameras cameras/geometry)
+set(allowed_backend backend/incremental backend/problem backend/map factors cameras cameras/geometry)
 set(allowed_frontend backend/map factors cameras cameras/geometry)
-set(allowed_apps frontend backend backend/problem backend/map factors cameras cameras/geometry)
+set(allowed_apps frontend backend backend/incremental backend/problem backend/map factors cameras cameras/geometry)
 
 function(room_of path out)
   set(best "")

@@ -1,0 +1,322 @@
+#include "backend/incremental/incremental_solver.h"
+
+#include <ceres/cost_function.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "backend/incremental/chart.h"
+#include "factors/make_reprojection_factor.h"
+#include "factors/relative_pose_factor.h"
+
+namespace hybrid_slam {
+
+namespace {
+
+// A term's squared mismatch per row, as a fraction of the typical squared residual, that is not
+// worth a thought.
+constexpr double kNegligible = 1e-6;
+
+// What may be linearised anew at once while credit is saved for all, in parts of the budget.
+constexpr double kCheap = 0.1;
+
+// Mean squared residual below which measurements count as perfect.
+constexpr double kLeastTypical = 1e-12;
+
+template <typename T>
+T& item(std::vector<T>& items, std::uint32_t index, const char* what) {
+  if (index >= items.size())
+    throw std::logic_error(std::string("IncrementalSolver: no such ") + what);
+  return items[index];
+}
+
+void erase_value(std::vector<std::uint32_t>& values, std::uint32_t value) {
+  values.erase(std::remove(values.begin(), values.end(), value), values.end());
+}
+
+}  // namespace
+
+std::string IncrementalOptions::validate() const {
+  if (!(relinearization > 0)) return "relinearization must be positive";
+  if (!(worst_mismatch > 0)) return "worst_mismatch must be positive";
+  if (!(burst >= 1)) return "burst must be at least 1";
+  if (!(wildfire >= 0)) return "wildfire must not be negative";
+  if (max_steps < 1) return "max_steps must be positive";
+  if (!(budget >= 0)) return "budget must not be negative";
+  if (!(chi2_mono > 0) || !(chi2_stereo > 0)) return "chi2 thresholds must be positive";
+  return {};
+}
+
+IncrementalSolver::IncrementalSolver(const IncrementalOptions& options)
+    : options_(options), tree_(PoseTree::Options{}) {
+  if (const std::string wrong = options.validate(); !wrong.empty()) {
+    throw std::invalid_argument("IncrementalOptions: " + wrong);
+  }
+}
+
+IncrementalSolver::~IncrementalSolver() = default;
+
+std::uint32_t IncrementalSolver::add_camera(const Camera& camera) {
+  cameras_.push_back(camera);
+  return static_cast<std::uint32_t>(cameras_.size()) - 1;
+}
+
+std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
+  const auto index = static_cast<std::uint32_t>(poses_.size());
+  poses_.push_back({frame.cam_from_world, frame.camera, frame.fixed, {}, {}});
+  tree_.resize(poses_.size());
+  if (!frame.fixed) newest_.push_back(index);
+  return index;
+}
+
+std::uint32_t IncrementalSolver::add_point(const Eigen::Vector3d& in_world) {
+  LandmarkTerm landmark;
+  landmark.base = in_world;
+  landmarks_.push_back(std::move(landmark));
+  landmark_terms_.push_back(
+      add_term(TermKind::kLandmark, static_cast<std::uint32_t>(landmarks_.size()) - 1));
+  return static_cast<std::uint32_t>(landmarks_.size()) - 1;
+}
+
+std::uint32_t IncrementalSolver::add_term(TermKind kind, std::uint32_t index) {
+  Term term;
+  term.kind = kind;
+  term.index = index;
+  terms_.push_back(term);
+  return static_cast<std::uint32_t>(terms_.size()) - 1;
+}
+
+std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observation) {
+  Pose& pose = item(poses_, observation.frame, "pose");
+  LandmarkTerm& landmark = item(landmarks_, observation.point, "point");
+  const Camera& camera = item(cameras_, pose.camera, "camera");
+  const auto index = static_cast<std::uint32_t>(observations_.size());
+  observations_.push_back(observation);
+  observation_there_.push_back(1);
+  observation_factors_.push_back(
+      make_reprojection_factor(camera, observation.measurement, observation.sigma));
+  LandmarkView view;
+  view.observation = index;
+  view.pose = observation.frame;
+  view.fixed = pose.fixed;
+  landmark.views.push_back(view);
+  if (!pose.fixed) {
+    landmark.poses.push_back(observation.frame);
+    pose.terms.push_back(landmark_terms_[observation.point]);
+  }
+  mark_dirty(landmark_terms_[observation.point]);
+  return index;
+}
+
+std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
+  const auto index = static_cast<std::uint32_t>(edges_.size());
+  item(poses_, edge.a, "pose");
+  item(poses_, edge.b, "pose");
+  edges_.push_back(edge);
+  edge_there_.push_back(1);
+  edge_factors_.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
+  EdgeTerm term;
+  for (const std::uint32_t pose : {edge.a, edge.b}) {
+    if (!poses_[pose].fixed) term.poses[term.variable++] = pose;
+  }
+  edge_terms_.push_back(term);
+  const std::uint32_t id = add_term(TermKind::kEdge, index);
+  for (const std::uint32_t pose : poses_of(id)) poses_[pose].terms.push_back(id);
+  mark_dirty(id);
+  return index;
+}
+
+void IncrementalSolver::remove_observation(std::uint32_t observation) {
+  if (item(observation_there_, observation, "observation") == 0) return;
+  observation_there_[observation] = 0;
+  const GraphObservation& removed = observations_[observation];
+  LandmarkTerm& landmark = landmarks_[removed.point];
+  const std::uint32_t term = landmark_terms_[removed.point];
+  mark_dirty(term);  // before: its former poses are touched too
+  std::erase_if(landmark.views,
+                [&](const LandmarkView& view) { return view.observation == observation; });
+  if (!poses_[removed.frame].fixed) {
+    touched_.push_back(removed.frame);
+    erase_value(landmark.poses, removed.frame);
+    erase_value(poses_[removed.frame].terms, term);
+  }
+}
+
+void IncrementalSolver::remove_edge(std::uint32_t edge) {
+  if (item(edge_there_, edge, "edge") == 0) return;
+  edge_there_[edge] = 0;
+  for (std::size_t i = 0; i < edge_terms_[edge].variable; ++i) {
+    const std::uint32_t pose = edge_terms_[edge].poses[i];
+    touched_.push_back(pose);
+    std::erase_if(poses_[pose].terms, [&](std::uint32_t term) {
+      return terms_[term].kind == TermKind::kEdge && terms_[term].index == edge;
+    });
+  }
+  edge_terms_[edge].variable = 0;
+}
+
+std::span<const std::uint32_t> IncrementalSolver::terms_of(std::uint32_t pose) const {
+  return poses_[pose].terms;
+}
+
+std::span<const std::uint32_t> IncrementalSolver::poses_of(std::uint32_t term) const {
+  const Term& t = terms_[term];
+  if (t.kind == TermKind::kEdge) {
+    const EdgeTerm& edge = edge_terms_[t.index];
+    return {edge.poses, edge.variable};
+  }
+  return landmarks_[t.index].poses;
+}
+
+void IncrementalSolver::assemble(std::uint32_t term, Front& front) const {
+  const Term& t = terms_[term];
+  if (t.kind == TermKind::kEdge) {
+    edge_terms_[t.index].assemble(front);
+  } else {
+    landmarks_[t.index].assemble(front);
+  }
+}
+
+void IncrementalSolver::mark_dirty(std::uint32_t term) {
+  if (terms_[term].dirty) return;
+  terms_[term].dirty = true;
+  dirty_.push_back(term);
+}
+
+Vector6d IncrementalSolver::delta(std::uint32_t pose) const {
+  return poses_[pose].fixed ? Vector6d::Zero() : tree_.delta(pose);
+}
+
+Rigid3d IncrementalSolver::pose(std::uint32_t index) const {
+  const Pose& pose = poses_.at(index);
+  return pose.fixed ? pose.base : chart_pose(pose.base, tree_.delta(index));
+}
+
+Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
+  return landmarks_.at(index).solve([this](std::uint32_t pose) { return tree_.delta(pose); });
+}
+
+// Measures anew how far the terms of these poses are from their linearisation.
+void IncrementalSolver::check(const std::vector<std::uint32_t>& moved) {
+  ++stamp_;
+  for (const std::uint32_t pose : moved) {
+    for (const std::uint32_t id : poses_[pose].terms) {
+      Term& term = terms_[id];
+      if (term.checked == stamp_) continue;
+      term.checked = stamp_;
+      evaluate(id);
+      if (!term.pending && term.mismatch > 0) {
+        term.pending = true;
+        pending_.push_back(id);
+      }
+    }
+  }
+  const double negligible = kNegligible * typical();
+  std::erase_if(pending_, [&](std::uint32_t id) {
+    Term& term = terms_[id];
+    term.pending = !term.dirty && term.mismatch > negligible * term.rows;
+    return !term.pending;
+  });
+}
+
+// Mean squared residual of a row.
+double IncrementalSolver::typical() const {
+  return std::max(squared_norm_ / std::max(rows_, 1.0), kLeastTypical);
+}
+
+// Marks pending terms as dirty, if together they or one of them are too far off. All of them, as
+// soon as that can be paid: linearising a part anew shifts the weak modes of the graph, and so
+// takes others off. If it never can be, the worst first. Until then, what is bad and cheap. Returns
+// how many.
+std::size_t IncrementalSolver::choose() {
+  const double worst = options_.worst_mismatch * options_.worst_mismatch * typical();
+  const auto is_bad = [&](const Term& term) { return term.mismatch > worst * term.rows; };
+  const double limit = options_.relinearization * std::max(squared_norm_, kLeastTypical);
+  if (mismatch_ <= limit && std::none_of(pending_.begin(), pending_.end(),
+                                         [&](std::uint32_t id) { return is_bad(terms_[id]); })) {
+    return 0;
+  }
+  std::sort(pending_.begin(), pending_.end(), [this](std::uint32_t a, std::uint32_t b) {
+    return std::pair(-terms_[a].mismatch, a) < std::pair(-terms_[b].mismatch, b);
+  });
+  double total = 0;
+  std::vector<char> marked;
+  for (const std::uint32_t id : pending_) total += tree_.cost_of(poses_of(id), marked);
+  const double full = options_.burst * options_.budget;
+  const bool all = total <= credit_;
+  const double ceiling = all || total > full ? credit_ : kCheap * options_.budget;
+
+  marked.clear();
+  std::size_t chosen = 0;
+  for (const std::uint32_t id : pending_) {
+    Term& term = terms_[id];
+    bool accept = all || (chosen > 0 && tree_.is_marked(poses_of(id), marked));
+    if (!accept && (is_bad(term) || total > full)) {
+      std::vector<char> tried = marked;
+      const double price = tree_.cost_of(poses_of(id), tried);
+      accept = price <= std::min(ceiling, credit_);
+      if (accept) {
+        credit_ -= price;
+        marked = std::move(tried);
+      }
+    }
+    if (!accept) continue;
+    term.pending = false;
+    mismatch_ -= term.mismatch;
+    term.mismatch = 0;
+    mark_dirty(id);
+    ++chosen;
+  }
+  if (all) credit_ -= total;
+  std::erase_if(pending_, [this](std::uint32_t id) { return !terms_[id].pending; });
+  return chosen;
+}
+
+UpdateSummary IncrementalSolver::update() {
+  UpdateSummary summary;
+  credit_ = std::min(credit_ + options_.budget, options_.burst * options_.budget);
+  std::vector<std::uint32_t> moved;
+  if (dirty_.empty() && touched_.empty()) summary.relinearized += choose();
+  for (int step = 0; step < options_.max_steps; ++step) {
+    if (dirty_.empty() && touched_.empty()) break;
+    for (const std::uint32_t term : dirty_) {
+      linearize(term);
+      terms_[term].dirty = false;
+      const auto poses = poses_of(term);
+      touched_.insert(touched_.end(), poses.begin(), poses.end());
+    }
+    dirty_.clear();
+    tree_.refactor(touched_, newest_, *this);
+    touched_.clear();
+    ++summary.steps;
+    summary.poses += tree_.last_poses();
+    summary.multiplications += tree_.last_cost();
+    moved.clear();
+    tree_.solve(options_.wildfire, moved);
+    summary.moved = std::max(summary.moved, moved.size());
+    check(moved);
+    if (step + 1 < options_.max_steps) summary.relinearized += choose();
+  }
+  newest_.clear();
+  summary.pending = pending_.size();
+  return summary;
+}
+
+FactorGraph IncrementalSolver::graph() const {
+  FactorGraph graph;
+  for (const Camera& camera : cameras_) graph.cameras.push_back({camera, 0});
+  for (std::uint32_t i = 0; i < poses_.size(); ++i) {
+    graph.frames.push_back({pose(i), poses_[i].camera, poses_[i].fixed});
+  }
+  for (std::uint32_t i = 0; i < landmarks_.size(); ++i) graph.points.push_back({point(i), false});
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    if (observation_there_[i] != 0) graph.observations.push_back(observations_[i]);
+  }
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    if (edge_there_[i] != 0) graph.edges.push_back(edges_[i]);
+  }
+  return graph;
+}
+
+}  // namespace hybrid_slam

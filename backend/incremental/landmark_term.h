@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cameras/geometry/rigid3d.h"
+
+#include <Eigen/Core>
+
+namespace hybrid_slam {
+
+class Front;
+
+// One observation of a landmark, linearised: with delta the chart coordinates of its pose
+// (backend/incremental/chart.h) and p the landmark,
+//   r = residual + by_pose * delta + by_point * (p - base)
+// in standard deviations. Two-row measurements leave the third row zero.
+struct LandmarkView {
+  std::uint32_t observation = 0;
+  std::uint32_t pose = 0;
+  bool fixed = false;   // the pose is known: by_pose is zero
+  bool usable = false;  // the point projects
+  double weight = 1;    // of its robust loss: residual and derivatives are multiplied by it
+  Eigen::Matrix<double, 3, 6> by_pose = Eigen::Matrix<double, 3, 6>::Zero();
+  Eigen::Matrix3d by_point = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 6, 3> reduced =
+      Eigen::Matrix<double, 6, 3>::Zero();  // by_pose^T by_point L^-T
+};
+
+// All observations of a landmark, with the landmark eliminated (Schur complement): what is left is
+// a term on the poses that see it,
+//   H(i, j) = [i = j] by_pose_i^T by_pose_i - reduced_i reduced_j^T.
+struct LandmarkTerm {
+  Eigen::Vector3d base = Eigen::Vector3d::Zero();  // where it was linearised
+  std::vector<LandmarkView> views;
+  std::vector<std::uint32_t> poses;                       // that vary, of the views, in their order
+  Eigen::Matrix3d factor = Eigen::Matrix3d::Identity();   // L, with L L^T = sum by_point^T by_point
+  Eigen::Vector3d half_solved = Eigen::Vector3d::Zero();  // L^-1 sum by_point^T residual
+  bool solvable = false;                                  // the views determine the point
+
+  // From the views' derivatives: factor, half_solved, reduced, solvable.
+  void eliminate();
+
+  // The point that minimises the term; delta_of(pose) gives a pose's chart coordinates.
+  template <typename DeltaOf>
+  Eigen::Vector3d solve(const DeltaOf& delta_of) const {
+    if (!solvable) return base;
+    Eigen::Vector3d right = half_solved;
+    for (const LandmarkView& view : views) {
+      if (view.usable && !view.fixed) {
+        right.noalias() += view.reduced.transpose() * delta_of(view.pose);
+      }
+    }
+    return base - factor.transpose().triangularView<Eigen::Upper>().solve(right);
+  }
+
+  void assemble(Front& front) const;
+};
+
+}  // namespace hybrid_slam
