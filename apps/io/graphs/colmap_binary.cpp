@@ -187,9 +187,7 @@ class BinaryFile {
   }
 
   void add_pose(const Rigid3d& pose) {
-    const auto& q = pose.rotation().coeffs();
-    for (const int i : {3, 0, 1, 2}) add(q[i]);
-    for (int i = 0; i < 3; ++i) add(double{pose.translation()[i]});
+    for (const int i : {3, 0, 1, 2, 4, 5, 6}) add(pose.params[i]);  // w x y z, translation
   }
 
   void add_sensor(const ColmapSensor& sensor) {

@@ -168,9 +168,7 @@ class TextFile {
   }
 
   void add_pose(const Rigid3d& pose) {
-    const auto& q = pose.rotation().coeffs();
-    const auto& t = pose.translation();
-    add(" {} {} {} {} {} {} {}", q[3], q[0], q[1], q[2], t[0], t[1], t[2]);
+    for (const int i : {3, 0, 1, 2, 4, 5, 6}) add(" {}", pose.params[i]);  // w x y z, translation
   }
 
   void add_sensor(const ColmapSensor& sensor) {

@@ -107,10 +107,9 @@ struct G2oReader {
 };
 
 void append_pose(fmt::memory_buffer& text, const Rigid3d& pose) {
-  const auto& t = pose.translation();
-  const auto& q = pose.rotation().coeffs();
-  fmt::format_to(std::back_inserter(text), " {} {} {} {} {} {} {}", t[0], t[1], t[2], q[0], q[1],
-                 q[2], q[3]);
+  for (const int i : {4, 5, 6, 0, 1, 2, 3}) {  // translation, quaternion x y z w
+    fmt::format_to(std::back_inserter(text), " {}", pose.params[i]);
+  }
 }
 
 void write_g2o(const std::filesystem::path& path, const FactorGraph& graph,

@@ -180,10 +180,11 @@ struct StreamWriter {
   std::string text = {};
 
   void append_pose(std::string_view word, const Rigid3d& pose) {
-    const auto& t = pose.translation();
-    const auto& q = pose.rotation().coeffs();
-    fmt::format_to(std::back_inserter(text), " {} {} {} {} {} {} {} {}", word, t[0], t[1], t[2],
-                   q[0], q[1], q[2], q[3]);
+    text += ' ';
+    text += word;
+    for (const int i : {4, 5, 6, 0, 1, 2, 3}) {  // translation, quaternion x y z w
+      fmt::format_to(std::back_inserter(text), " {}", pose.params[i]);
+    }
   }
 
   void write(const fs::path& path, const FactorGraph& graph) {
