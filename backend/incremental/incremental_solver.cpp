@@ -40,6 +40,7 @@ void erase_value(std::vector<std::uint32_t>& values, std::uint32_t value) {
 std::string IncrementalOptions::validate() const {
   if (!(relinearization > 0)) return "relinearization must be positive";
   if (!(worst_mismatch > 0)) return "worst_mismatch must be positive";
+  if (window < 0) return "window must not be negative";
   if (!(burst >= 1)) return "burst must be at least 1";
   if (!(wildfire >= 0)) return "wildfire must not be negative";
   if (max_steps < 1) return "max_steps must be positive";
@@ -64,7 +65,7 @@ std::uint32_t IncrementalSolver::add_camera(const Camera& camera) {
 
 std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
   const auto index = static_cast<std::uint32_t>(poses_.size());
-  poses_.push_back({frame.cam_from_world, frame.camera, frame.fixed, {}, {}});
+  poses_.push_back({frame.cam_from_world, frame.camera, frame.fixed, {}});
   tree_.resize(poses_.size());
   if (!frame.fixed) newest_.push_back(index);
   return index;
@@ -91,11 +92,11 @@ std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observa
   Pose& pose = item(poses_, observation.frame, "pose");
   LandmarkTerm& landmark = item(landmarks_, observation.point, "point");
   const Camera& camera = item(cameras_, pose.camera, "camera");
-  const auto index = static_cast<std::uint32_t>(observations_.size());
-  observations_.push_back(observation);
-  observation_there_.push_back(1);
-  observation_factors_.push_back(
-      make_reprojection_factor(camera, observation.measurement, observation.sigma));
+  const std::uint32_t index = free_observation();
+  observations_[index] = observation;
+  observation_there_[index] = 1;
+  observation_factors_[index] =
+      make_reprojection_factor(camera, observation.measurement, observation.sigma);
   LandmarkView view;
   view.observation = index;
   view.pose = observation.frame;
@@ -107,6 +108,18 @@ std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observa
   }
   mark_dirty(landmark_terms_[observation.point]);
   return index;
+}
+
+std::uint32_t IncrementalSolver::free_observation() {
+  if (!free_observations_.empty()) {
+    const std::uint32_t index = free_observations_.back();
+    free_observations_.pop_back();
+    return index;
+  }
+  observations_.emplace_back();
+  observation_there_.push_back(0);
+  observation_factors_.emplace_back();
+  return static_cast<std::uint32_t>(observations_.size()) - 1;
 }
 
 std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
@@ -134,6 +147,8 @@ void IncrementalSolver::remove_observation(std::uint32_t observation) {
   LandmarkTerm& landmark = landmarks_[removed.point];
   const std::uint32_t term = landmark_terms_[removed.point];
   mark_dirty(term);  // before: its former poses are touched too
+  observation_factors_[observation].reset();
+  free_observations_.push_back(observation);
   std::erase_if(landmark.views,
                 [&](const LandmarkView& view) { return view.observation == observation; });
   if (!poses_[removed.frame].fixed) {
@@ -166,6 +181,7 @@ std::span<const std::uint32_t> IncrementalSolver::poses_of(std::uint32_t term) c
     const EdgeTerm& edge = edge_terms_[t.index];
     return {edge.poses, edge.variable};
   }
+  if (t.kind == TermKind::kPrior) return priors_[t.index].poses;
   return landmarks_[t.index].poses;
 }
 
@@ -173,6 +189,8 @@ void IncrementalSolver::assemble(std::uint32_t term, Front& front) const {
   const Term& t = terms_[term];
   if (t.kind == TermKind::kEdge) {
     edge_terms_[t.index].assemble(front);
+  } else if (t.kind == TermKind::kPrior) {
+    priors_[t.index].assemble(front);
   } else {
     landmarks_[t.index].assemble(front);
   }
@@ -186,6 +204,10 @@ void IncrementalSolver::mark_dirty(std::uint32_t term) {
 
 Vector6d IncrementalSolver::delta(std::uint32_t pose) const {
   return poses_[pose].fixed ? Vector6d::Zero() : tree_.delta(pose);
+}
+
+Matrix6d IncrementalSolver::covariance(std::uint32_t pose) const {
+  return poses_.at(pose).fixed ? Matrix6d::Zero() : tree_.covariance(pose);
 }
 
 Rigid3d IncrementalSolver::pose(std::uint32_t index) const {
@@ -299,6 +321,7 @@ UpdateSummary IncrementalSolver::update() {
     if (step + 1 < options_.max_steps) summary.relinearized += choose();
   }
   newest_.clear();
+  slide_window();
   summary.pending = pending_.size();
   return summary;
 }
@@ -315,6 +338,12 @@ FactorGraph IncrementalSolver::graph() const {
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     if (edge_there_[i] != 0) graph.edges.push_back(edges_[i]);
+  }
+  for (const PriorTerm& prior : priors_) {
+    if (prior.poses.empty()) continue;
+    GraphPrior made{prior.poses, {}, prior.rows.jacobian, prior.rows.residual};
+    for (const std::uint32_t i : prior.poses) made.bases.push_back(poses_[i].base);
+    graph.priors.push_back(std::move(made));
   }
   return graph;
 }

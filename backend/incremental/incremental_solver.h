@@ -6,6 +6,7 @@
 #include "backend/incremental/edge_term.h"
 #include "backend/incremental/landmark_term.h"
 #include "backend/incremental/pose_tree.h"
+#include "backend/incremental/prior_term.h"
 #include "backend/problem/factor_graph.h"
 #include "backend/problem/problem_config.h"
 
@@ -32,6 +33,10 @@ struct IncrementalOptions {
   Loss loss = Loss::kNone;  // of observations, at the square root of the threshold
   double chi2_mono = 5.991;
   double chi2_stereo = 7.815;
+  // Poses that stay in the system; older ones are marginalised: they and the landmarks they see are
+  // minimised out, what that says about the others stays as a linear prior, and they no longer
+  // move. A landmark that is seen again afterwards starts anew. 0: all poses stay.
+  int window = 0;
 
   std::string validate() const;
 };
@@ -54,7 +59,8 @@ class IncrementalSolver final : private TermSource {
   explicit IncrementalSolver(const IncrementalOptions& options);
   ~IncrementalSolver() override;
 
-  // All return the index of what they add, counted from 0 per kind.
+  // All return the index of what they add, counted from 0 per kind; that of an observation which
+  // was removed or marginalised is used again.
   std::uint32_t add_camera(const Camera& camera);
   std::uint32_t add_pose(const GraphFrame& frame);
   std::uint32_t add_point(const Eigen::Vector3d& in_world);
@@ -62,6 +68,10 @@ class IncrementalSolver final : private TermSource {
   std::uint32_t add_edge(const GraphEdge& edge);
   void remove_observation(std::uint32_t observation);
   void remove_edge(std::uint32_t edge);
+
+  // The covariance of a pose's perturbation in the frame of the world (chart.h), given all that was
+  // taken in; conditional on what is fixed.
+  Matrix6d covariance(std::uint32_t pose) const;
 
   // Takes in what was added and removed since the last update.
   UpdateSummary update();
@@ -74,7 +84,7 @@ class IncrementalSolver final : private TermSource {
   FactorGraph graph() const;
 
  private:
-  enum class TermKind : std::uint8_t { kEdge, kLandmark };
+  enum class TermKind : std::uint8_t { kEdge, kLandmark, kPrior };
 
   struct Term {
     TermKind kind = TermKind::kEdge;
@@ -92,13 +102,13 @@ class IncrementalSolver final : private TermSource {
     std::uint32_t camera = GraphFrame::kNoCamera;
     bool fixed = false;
     std::vector<std::uint32_t> terms;
-    std::vector<std::uint32_t> points;  // seen by it, also where they make no term
   };
 
   std::span<const std::uint32_t> terms_of(std::uint32_t pose) const override;
   std::span<const std::uint32_t> poses_of(std::uint32_t term) const override;
   void assemble(std::uint32_t term, Front& front) const override;
 
+  std::uint32_t free_observation();
   std::uint32_t add_term(TermKind kind, std::uint32_t index);
   void mark_dirty(std::uint32_t term);
   void linearize(std::uint32_t term);
@@ -117,6 +127,12 @@ class IncrementalSolver final : private TermSource {
   void check(const std::vector<std::uint32_t>& moved);
   std::size_t choose();
   double typical() const;
+
+  LinearSystem rows_of_term(std::uint32_t term) const;
+  void marginalize_poses(const std::vector<std::uint32_t>& poses);
+  void add_prior(PriorTerm prior);
+  void drop_term(std::uint32_t term);
+  void slide_window();
   Vector6d delta(std::uint32_t pose) const;
 
   IncrementalOptions options_;
@@ -133,10 +149,13 @@ class IncrementalSolver final : private TermSource {
   std::vector<char> edge_there_;
   std::vector<std::unique_ptr<ceres::CostFunction>> edge_factors_;
   std::vector<EdgeTerm> edge_terms_;
-  std::vector<std::uint32_t> dirty_;    // terms
-  std::vector<std::uint32_t> touched_;  // poses whose terms changed
-  std::vector<std::uint32_t> newest_;   // poses
-  std::vector<std::uint32_t> pending_;  // terms
+  std::vector<PriorTerm> priors_;
+  std::vector<std::uint32_t> free_observations_;  // indices that may be used again
+  std::uint32_t oldest_ = 0;                      // poses before it do not vary
+  std::vector<std::uint32_t> dirty_;              // terms
+  std::vector<std::uint32_t> touched_;            // poses whose terms changed
+  std::vector<std::uint32_t> newest_;             // poses
+  std::vector<std::uint32_t> pending_;            // terms
   std::uint64_t stamp_ = 0;
   double squared_norm_ = 0;  // of all terms
   double rows_ = 0;

@@ -21,7 +21,7 @@ void IncrementalSolver::linearize(std::uint32_t term) {
   const Term& t = terms_[term];
   if (t.kind == TermKind::kEdge) {
     linearize_edge(t.index);
-  } else {
+  } else if (t.kind == TermKind::kLandmark) {
     linearize_landmark(t.index);
   }
 }
@@ -144,6 +144,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
 
 void IncrementalSolver::evaluate(std::uint32_t id) {
   Term& term = terms_[id];
+  if (term.kind == TermKind::kPrior) return;  // never off its linearisation
   const Evaluation at =
       term.kind == TermKind::kEdge ? evaluate_edge(term.index) : evaluate_landmark(term.index);
   squared_norm_ += at.squared_norm - term.squared_norm;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 
 #include <Eigen/Cholesky>
 
@@ -285,6 +286,54 @@ void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
     stack.insert(stack.end(), clique.children.begin(), clique.children.end());
   }
   for (std::size_t i = first; i < changed.size(); ++i) moved_[changed[i]] = 0;
+}
+
+// Forward and back substitution with the pose's unit vectors, which concern its clique and those
+// above only. Values are kept by pose: every pose above is frontal in one clique of the path.
+Matrix6d PoseTree::covariance(std::uint32_t pose) const {
+  using Columns = Eigen::Matrix<double, Eigen::Dynamic, 6>;
+  std::vector<std::int32_t> path;
+  for (std::int32_t i = clique_of_[pose]; i != kNone; i = at(i).parent) path.push_back(i);
+  if (path.empty()) return Matrix6d::Zero();
+  std::map<std::uint32_t, Matrix6d> value;
+  const auto gather = [&](const std::vector<std::uint32_t>& poses) {
+    Columns columns = Columns::Zero(static_cast<Eigen::Index>(6 * poses.size()), 6);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const auto found = value.find(poses[i]);
+      if (found != value.end())
+        columns.middleRows<6>(static_cast<Eigen::Index>(6 * i)) = found->second;
+    }
+    return columns;
+  };
+  const auto scatter = [&](const std::vector<std::uint32_t>& poses, const Columns& columns) {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      value[poses[i]] = columns.middleRows<6>(static_cast<Eigen::Index>(6 * i));
+    }
+  };
+  value[pose] = Matrix6d::Identity();
+  const auto split = [](const Clique& clique) {
+    return std::pair(static_cast<Eigen::Index>(6 * clique.frontals.size()),
+                     static_cast<Eigen::Index>(6 * clique.separator.size()));
+  };
+  for (const std::int32_t i : path) {
+    const Clique& clique = at(i);
+    const auto [f, s] = split(clique);
+    Columns solved = gather(clique.frontals);
+    clique.factor.topRows(f).triangularView<Eigen::Lower>().solveInPlace(solved);
+    scatter(clique.frontals, solved);
+    if (s > 0) {
+      scatter(clique.separator, gather(clique.separator) - clique.factor.middleRows(f, s) * solved);
+    }
+  }
+  for (std::size_t k = path.size(); k-- > 0;) {
+    const Clique& clique = at(path[k]);
+    const auto [f, s] = split(clique);
+    Columns right = gather(clique.frontals);
+    if (s > 0) right -= clique.factor.middleRows(f, s).transpose() * gather(clique.separator);
+    clique.factor.topRows(f).triangularView<Eigen::Lower>().transpose().solveInPlace(right);
+    scatter(clique.frontals, right);
+  }
+  return value.at(pose);
 }
 
 }  // namespace hybrid_slam

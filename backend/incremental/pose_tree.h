@@ -50,6 +50,9 @@ class PoseTree {
     sent_[pose].setZero();
   }
 
+  // Of a pose's delta: its block of H^-1. Looks at the pose's clique and those above.
+  Matrix6d covariance(std::uint32_t pose) const;
+
   std::size_t clique_count() const { return cliques_.size() - free_.size(); }
   double last_cost() const { return last_cost_; }  // of the last refactor, in multiplications
   std::size_t last_poses() const { return last_poses_; }

@@ -54,6 +54,19 @@ const char* fault_of(const FactorGraph& graph, const GraphEdge& edge) {
   return edge_fault(edge, graph.frames.size());
 }
 
+const char* fault_of(const FactorGraph& graph, const GraphPrior& prior) {
+  for (const std::uint32_t frame : prior.frames) {
+    if (frame >= graph.frames.size()) return "no such frame";
+  }
+  const auto columns = static_cast<Eigen::Index>(6 * prior.frames.size());
+  if (prior.bases.size() != prior.frames.size() || prior.jacobian.cols() != columns ||
+      prior.jacobian.rows() != prior.residual.size() || prior.residual.size() == 0) {
+    return "sizes do not agree";
+  }
+  if (!prior.jacobian.allFinite() || !prior.residual.allFinite()) return "values are not finite";
+  return nullptr;
+}
+
 const char* fault_of(const FactorGraph& graph, const GraphSimilarityEdge& edge) {
   const char* fault = edge_fault(edge, graph.similarities.size());
   return fault == nullptr && !(edge.a_from_b.scale() > 0) ? "scale must be positive" : fault;
@@ -104,6 +117,7 @@ std::string FactorGraph::validate() const {
   if (wrong.empty()) wrong = first_fault(*this, points, "point");
   if (wrong.empty()) wrong = first_fault(*this, observations, "observation");
   if (wrong.empty()) wrong = first_fault(*this, edges, "edge");
+  if (wrong.empty()) wrong = first_fault(*this, priors, "prior");
   if (wrong.empty()) wrong = first_fault(*this, similarities, "similarity");
   if (wrong.empty()) wrong = first_fault(*this, similarity_edges, "similarity edge");
   return wrong;

@@ -49,6 +49,14 @@ struct GraphEdge {
   bool loop = false;                            // takes the edges' robust loss
 };
 
+// What marginalised poses left on others, see factors/linear_prior.h.
+struct GraphPrior {
+  std::vector<std::uint32_t> frames;
+  std::vector<Rigid3d> bases;  // as frames
+  Eigen::MatrixXd jacobian;    // rows x 6 frames
+  Eigen::VectorXd residual;
+};
+
 // The same with scale, for maps whose scale may have drifted: factors/relative_similarity_factor.h.
 struct GraphSimilarity {
   Sim3d cam_from_world;
@@ -71,6 +79,7 @@ struct FactorGraph {
   std::vector<GraphPoint> points;
   std::vector<GraphObservation> observations;
   std::vector<GraphEdge> edges;
+  std::vector<GraphPrior> priors;
   std::vector<GraphSimilarity> similarities;
   std::vector<GraphSimilarityEdge> similarity_edges;
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "factors/linear_prior.h"
 #include "factors/make_reprojection_factor.h"
 #include "factors/manifolds.h"
 #include "factors/relative_pose_factor.h"
@@ -83,6 +84,13 @@ class Builder {
                      SharedLoss(observation_loss, options.chi2_stereo));
     add_edges(graph_.edges, factors_.edges, SharedLoss(options.loop_loss, options.chi2_loop),
               [this](std::uint32_t i) { return pose_block(i); });
+    for (std::size_t i = 0; i < graph_.priors.size(); ++i) {
+      std::vector<double*> blocks;
+      for (const std::uint32_t frame : graph_.priors[i].frames) {
+        blocks.push_back(pose_block(frame));
+      }
+      problem_->AddResidualBlock(factors_.priors[i].get(), nullptr, blocks);
+    }
     add_edges(graph_.similarity_edges, factors_.similarity_edges,
               SharedLoss(options.loop_loss, options.chi2_loop),
               [this](std::uint32_t i) { return similarity_block(i); });
@@ -191,6 +199,10 @@ GraphFactors make_factors(const FactorGraph& graph) {
   for (const GraphEdge& edge : graph.edges) {
     factors.edges.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
   }
+  for (const GraphPrior& prior : graph.priors) {
+    factors.priors.push_back(
+        std::make_unique<LinearPrior>(prior.bases, prior.jacobian, prior.residual));
+  }
   factors.similarity_edges.reserve(graph.similarity_edges.size());
   for (const GraphSimilarityEdge& edge : graph.similarity_edges) {
     factors.similarity_edges.push_back(
@@ -222,6 +234,15 @@ double edges_chi2(const FactorGraph& graph, const GraphFactors& factors) {
     const double* blocks[] = {graph.frames[graph.edges[i].a].cam_from_world.params.data(),
                               graph.frames[graph.edges[i].b].cam_from_world.params.data()};
     sum += squared_norm(*factors.edges[i], blocks);
+  }
+  for (std::size_t i = 0; i < graph.priors.size(); ++i) {
+    std::vector<const double*> blocks;
+    for (const std::uint32_t frame : graph.priors[i].frames) {
+      blocks.push_back(graph.frames[frame].cam_from_world.params.data());
+    }
+    Eigen::VectorXd residual(graph.priors[i].residual.size());
+    factors.priors[i]->Evaluate(blocks.data(), residual.data(), nullptr);
+    sum += residual.squaredNorm();
   }
   for (std::size_t i = 0; i < graph.similarity_edges.size(); ++i) {
     const GraphSimilarityEdge& edge = graph.similarity_edges[i];

@@ -23,6 +23,7 @@ struct GraphFactors {
 
   std::vector<std::unique_ptr<ceres::CostFunction>> observations;
   std::vector<std::unique_ptr<ceres::CostFunction>> edges;
+  std::vector<std::unique_ptr<ceres::CostFunction>> priors;
   std::vector<std::unique_ptr<ceres::CostFunction>> similarity_edges;
   std::vector<char> active;  // per observation; 0: set aside
 };
@@ -34,7 +35,7 @@ GraphFactors make_factors(const FactorGraph& graph);
 // does not project.
 std::vector<double> observations_chi2(const FactorGraph& graph, const GraphFactors& factors);
 
-// Of all edges of both kinds together.
+// Of all edges of both kinds and all priors together.
 double edges_chi2(const FactorGraph& graph, const GraphFactors& factors);
 
 // Rows of the residual of an observation: 3 of a stereo measurement, else 2.
