@@ -10,10 +10,18 @@ namespace hybrid_slam {
 
 namespace {
 
+// Vertices as they are numbered, the last ones at the end.
+std::vector<std::uint32_t> time_order(const std::vector<char>& last) {
+  std::vector<std::uint32_t> order(last.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_partition(order.begin(), order.end(),
+                        [&](std::uint32_t vertex) { return last[vertex] == 0; });
+  return order;
+}
+
 // Vertices by constrained approximate minimum degree.
 std::vector<std::uint32_t> minimum_degree_order(
     const std::vector<std::vector<std::uint32_t>>& adjacency, const std::vector<char>& last) {
-  if (adjacency.size() < 2) return std::vector<std::uint32_t>(adjacency.size(), 0);
   const auto n = static_cast<int>(adjacency.size());
   std::vector<int> starts{0};
   std::vector<int> rows;
@@ -21,6 +29,7 @@ std::vector<std::uint32_t> minimum_degree_order(
     for (const std::uint32_t v : neighbours) rows.push_back(static_cast<int>(v));
     starts.push_back(static_cast<int>(rows.size()));
   }
+  if (rows.empty()) return time_order(last);
   std::vector<int> constraints(last.begin(), last.end());
   std::vector<int> permutation(adjacency.size());
   double control[CAMD_CONTROL];
@@ -81,8 +90,7 @@ std::vector<EliminationClique> eliminate(const std::vector<std::vector<std::uint
                                          const std::vector<char>& last, std::size_t max_padding) {
   std::vector<std::uint32_t> vertex = minimum_degree_order(adjacency, last);
   auto rows = structures(adjacency, vertex);
-  std::vector<std::uint32_t> in_time(adjacency.size());
-  std::iota(in_time.begin(), in_time.end(), 0U);
+  std::vector<std::uint32_t> in_time = time_order(last);
   auto rows_in_time = structures(adjacency, in_time);
   if (cost_of(rows_in_time) <= kPatience * cost_of(rows)) {
     vertex = std::move(in_time);

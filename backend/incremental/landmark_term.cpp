@@ -1,5 +1,7 @@
 #include "backend/incremental/landmark_term.h"
 
+#include <algorithm>
+
 #include <Eigen/Cholesky>
 
 #include "backend/incremental/front.h"
@@ -30,7 +32,11 @@ void LandmarkTerm::eliminate() {
 }
 
 void LandmarkTerm::assemble(Front& front) const {
-  if (!solvable) return;
+  // What a single view tells is used up by the point; rounding would be all that is left.
+  if (!solvable || std::count_if(views.begin(), views.end(),
+                                 [](const LandmarkView& view) { return view.usable; }) < 2) {
+    return;
+  }
   for (std::size_t i = 0; i < views.size(); ++i) {
     const LandmarkView& a = views[i];
     if (!a.usable || a.fixed) continue;
@@ -41,7 +47,9 @@ void LandmarkTerm::assemble(Front& front) const {
     for (std::size_t j = 0; j < i; ++j) {
       const LandmarkView& b = views[j];
       if (!b.usable || b.fixed) continue;
-      front.add(slot_a, front.slot(b.pose), -a.reduced * b.reduced.transpose());
+      const Matrix6d cross = -a.reduced * b.reduced.transpose();
+      front.add(slot_a, front.slot(b.pose), cross);
+      if (a.pose == b.pose) front.add(slot_a, slot_a, cross.transpose());
     }
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <stdexcept>
 
 #include <Eigen/Cholesky>
 
@@ -231,6 +232,9 @@ void PoseTree::factor(std::int32_t index, const std::vector<std::uint32_t>& own,
       damped.diagonal().array() += damping * scale;
       llt.compute(damped);
     }
+  }
+  if (!llt.matrixLLT().diagonal().allFinite() || !clique.factor.row(f + s).allFinite()) {
+    throw std::logic_error("PoseTree: a term is not finite");
   }
   clique.factor.topRows(f) = llt.matrixL();
   auto below = clique.factor.bottomRows(s + 1);
