@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "backend/incremental/chart.h"
+#include "backend/problem/measurement_fault.h"
 #include "factors/make_reprojection_factor.h"
 #include "factors/relative_pose_factor.h"
 
@@ -14,9 +16,9 @@ namespace hybrid_slam {
 
 namespace {
 
-// A term's squared mismatch per row, as a fraction of the typical squared residual, that is not
-// worth a thought.
-constexpr double kNegligible = 1e-6;
+// A term's squared mismatch per row that is not worth a thought, as a fraction of the typical
+// squared residual times what relinearization allows.
+constexpr double kNegligible = 1e-2;
 
 // What may be linearised anew at once while credit is saved for all, in parts of the budget.
 constexpr double kCheap = 0.1;
@@ -29,6 +31,17 @@ T& item(std::vector<T>& items, std::uint32_t index, const char* what) {
   if (index >= items.size())
     throw std::logic_error(std::string("IncrementalSolver: no such ") + what);
   return items[index];
+}
+
+// Throws if there is a fault.
+void refuse(const char* fault, const char* what) {
+  if (fault == nullptr) return;
+  throw std::logic_error("IncrementalSolver: " + std::string(what) + ": " + fault);
+}
+
+bool sees(const LandmarkTerm& landmark, std::uint32_t pose) {
+  return std::any_of(landmark.views.begin(), landmark.views.end(),
+                     [&](const LandmarkView& view) { return view.pose == pose; });
 }
 
 void erase_value(std::vector<std::uint32_t>& values, std::uint32_t value) {
@@ -64,6 +77,7 @@ std::uint32_t IncrementalSolver::add_camera(const Camera& camera) {
 }
 
 std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
+  refuse(frame.cam_from_world.params.allFinite() ? nullptr : "not finite", "pose");
   const auto index = static_cast<std::uint32_t>(poses_.size());
   poses_.push_back({frame.cam_from_world, frame.camera, frame.fixed, {}});
   tree_.resize(poses_.size());
@@ -72,6 +86,7 @@ std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
 }
 
 std::uint32_t IncrementalSolver::add_point(const Eigen::Vector3d& in_world) {
+  refuse(in_world.allFinite() ? nullptr : "not finite", "point");
   LandmarkTerm landmark;
   landmark.base = in_world;
   landmarks_.push_back(std::move(landmark));
@@ -92,6 +107,7 @@ std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observa
   Pose& pose = item(poses_, observation.frame, "pose");
   LandmarkTerm& landmark = item(landmarks_, observation.point, "point");
   const Camera& camera = item(cameras_, pose.camera, "camera");
+  refuse(measurement_fault(observation, camera), "observation");
   const std::uint32_t index = free_observation();
   observations_[index] = observation;
   observation_there_[index] = 1;
@@ -101,8 +117,9 @@ std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observa
   view.observation = index;
   view.pose = observation.frame;
   view.fixed = pose.fixed;
+  const bool is_first = !sees(landmark, observation.frame);
   landmark.views.push_back(view);
-  if (!pose.fixed) {
+  if (!pose.fixed && is_first) {
     landmark.poses.push_back(observation.frame);
     pose.terms.push_back(landmark_terms_[observation.point]);
   }
@@ -123,9 +140,10 @@ std::uint32_t IncrementalSolver::free_observation() {
 }
 
 std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
-  const auto index = static_cast<std::uint32_t>(edges_.size());
   item(poses_, edge.a, "pose");
   item(poses_, edge.b, "pose");
+  refuse(measurement_fault(edge), "edge");
+  const auto index = static_cast<std::uint32_t>(edges_.size());
   edges_.push_back(edge);
   edge_there_.push_back(1);
   edge_factors_.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
@@ -135,6 +153,7 @@ std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
   }
   edge_terms_.push_back(term);
   const std::uint32_t id = add_term(TermKind::kEdge, index);
+  edge_ids_.push_back(id);
   for (const std::uint32_t pose : poses_of(id)) poses_[pose].terms.push_back(id);
   mark_dirty(id);
   return index;
@@ -151,7 +170,7 @@ void IncrementalSolver::remove_observation(std::uint32_t observation) {
   free_observations_.push_back(observation);
   std::erase_if(landmark.views,
                 [&](const LandmarkView& view) { return view.observation == observation; });
-  if (!poses_[removed.frame].fixed) {
+  if (!poses_[removed.frame].fixed && !sees(landmark, removed.frame)) {
     touched_.push_back(removed.frame);
     erase_value(landmark.poses, removed.frame);
     erase_value(poses_[removed.frame].terms, term);
@@ -161,12 +180,11 @@ void IncrementalSolver::remove_observation(std::uint32_t observation) {
 void IncrementalSolver::remove_edge(std::uint32_t edge) {
   if (item(edge_there_, edge, "edge") == 0) return;
   edge_there_[edge] = 0;
+  mark_dirty(edge_ids_[edge]);
   for (std::size_t i = 0; i < edge_terms_[edge].variable; ++i) {
     const std::uint32_t pose = edge_terms_[edge].poses[i];
     touched_.push_back(pose);
-    std::erase_if(poses_[pose].terms, [&](std::uint32_t term) {
-      return terms_[term].kind == TermKind::kEdge && terms_[term].index == edge;
-    });
+    erase_value(poses_[pose].terms, edge_ids_[edge]);
   }
   edge_terms_[edge].variable = 0;
 }
@@ -219,22 +237,25 @@ Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
   return landmarks_.at(index).solve([this](std::uint32_t pose) { return tree_.delta(pose); });
 }
 
-// Measures anew how far the terms of these poses are from their linearisation.
-void IncrementalSolver::check(const std::vector<std::uint32_t>& moved) {
+// Measures anew how far these terms and those of these poses are from their linearisation.
+void IncrementalSolver::check(const std::vector<std::uint32_t>& linearized,
+                              const std::vector<std::uint32_t>& moved) {
   ++stamp_;
-  for (const std::uint32_t pose : moved) {
-    for (const std::uint32_t id : poses_[pose].terms) {
-      Term& term = terms_[id];
-      if (term.checked == stamp_) continue;
-      term.checked = stamp_;
-      evaluate(id);
-      if (!term.pending && term.mismatch > 0) {
-        term.pending = true;
-        pending_.push_back(id);
-      }
+  const auto check_term = [this](std::uint32_t id) {
+    Term& term = terms_[id];
+    if (term.checked == stamp_) return;
+    term.checked = stamp_;
+    evaluate(id);
+    if (!term.pending && term.mismatch > 0) {
+      term.pending = true;
+      pending_.push_back(id);
     }
+  };
+  for (const std::uint32_t id : linearized) check_term(id);
+  for (const std::uint32_t pose : moved) {
+    for (const std::uint32_t id : poses_[pose].terms) check_term(id);
   }
-  const double negligible = kNegligible * typical();
+  const double negligible = kNegligible * options_.relinearization * typical();
   std::erase_if(pending_, [&](std::uint32_t id) {
     Term& term = terms_[id];
     term.pending = !term.dirty && term.mismatch > negligible * term.rows;
@@ -298,17 +319,18 @@ std::size_t IncrementalSolver::choose() {
 UpdateSummary IncrementalSolver::update() {
   UpdateSummary summary;
   credit_ = std::min(credit_ + options_.budget, options_.burst * options_.budget);
+  std::vector<std::uint32_t> linearized;
   std::vector<std::uint32_t> moved;
   if (dirty_.empty() && touched_.empty()) summary.relinearized += choose();
   for (int step = 0; step < options_.max_steps; ++step) {
     if (dirty_.empty() && touched_.empty()) break;
-    for (const std::uint32_t term : dirty_) {
+    linearized = std::exchange(dirty_, {});
+    for (const std::uint32_t term : linearized) {
       linearize(term);
       terms_[term].dirty = false;
       const auto poses = poses_of(term);
       touched_.insert(touched_.end(), poses.begin(), poses.end());
     }
-    dirty_.clear();
     tree_.refactor(touched_, newest_, *this);
     touched_.clear();
     ++summary.steps;
@@ -317,7 +339,7 @@ UpdateSummary IncrementalSolver::update() {
     moved.clear();
     tree_.solve(options_.wildfire, moved);
     summary.moved = std::max(summary.moved, moved.size());
-    check(moved);
+    check(linearized, moved);
     if (step + 1 < options_.max_steps) summary.relinearized += choose();
   }
   newest_.clear();

@@ -60,7 +60,8 @@ class IncrementalSolver final : private TermSource {
   ~IncrementalSolver() override;
 
   // All return the index of what they add, counted from 0 per kind; that of an observation which
-  // was removed or marginalised is used again.
+  // was removed or marginalised is used again. They throw std::logic_error and add nothing if an
+  // index is out of range or a number cannot be used.
   std::uint32_t add_camera(const Camera& camera);
   std::uint32_t add_pose(const GraphFrame& frame);
   std::uint32_t add_point(const Eigen::Vector3d& in_world);
@@ -124,7 +125,7 @@ class IncrementalSolver final : private TermSource {
   Evaluation evaluate_edge(std::uint32_t index) const;
   Evaluation evaluate_landmark(std::uint32_t index) const;
   void evaluate(std::uint32_t term);
-  void check(const std::vector<std::uint32_t>& moved);
+  void check(const std::vector<std::uint32_t>& linearized, const std::vector<std::uint32_t>& moved);
   std::size_t choose();
   double typical() const;
 
@@ -149,6 +150,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<char> edge_there_;
   std::vector<std::unique_ptr<ceres::CostFunction>> edge_factors_;
   std::vector<EdgeTerm> edge_terms_;
+  std::vector<std::uint32_t> edge_ids_;  // the term of an edge
   std::vector<PriorTerm> priors_;
   std::vector<std::uint32_t> free_observations_;  // indices that may be used again
   std::uint32_t oldest_ = 0;                      // poses before it do not vary

@@ -15,6 +15,9 @@ namespace {
 // Squared mismatch of an observation that does not project any more.
 constexpr double kFarOff = 1e6;
 
+// How often the step of a point is cut in half before it is given up.
+constexpr int kHalvings = 10;
+
 }  // namespace
 
 void IncrementalSolver::linearize(std::uint32_t term) {
@@ -85,20 +88,29 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
 
 void IncrementalSolver::linearize_landmark(std::uint32_t index) {
   LandmarkTerm& landmark = landmarks_[index];
-  const Eigen::Vector3d moved = point(index);
+  Eigen::Vector3d step = point(index) - landmark.base;
+  if (!step.allFinite()) step.setZero();
   std::vector<LandmarkView> views = landmark.views;
-  bool all = moved.allFinite();
-  for (LandmarkView& view : views) {
-    const bool was_usable = view.usable;
-    view.usable = all && linearize_view(moved, view);
-    all = all && (view.usable || !was_usable);
+  const auto linearize_at = [&](const Eigen::Vector3d& at) {
+    bool all = true;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      views[i].usable = linearize_view(at, views[i]);
+      all = all && (views[i].usable || !landmark.views[i].usable);
+    }
+    return all;
+  };
+  // A step that takes the point out of a view which had it is too long.
+  bool fits = linearize_at(landmark.base + step);
+  for (int i = 0; i < kHalvings && !fits; ++i) {
+    step *= 0.5;
+    fits = linearize_at(landmark.base + step);
   }
-  if (all) {
-    landmark.base = moved;
-    landmark.views = std::move(views);
-  } else {  // the step was too long: the point stays where it could be seen
-    for (LandmarkView& view : landmark.views) view.usable = linearize_view(landmark.base, view);
+  if (!fits) {
+    step.setZero();
+    linearize_at(landmark.base);
   }
+  landmark.base += step;
+  landmark.views = std::move(views);
   landmark.eliminate();
 }
 

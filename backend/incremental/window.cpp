@@ -45,15 +45,16 @@ LinearSystem rows_of(const LandmarkTerm& landmark) {
   const auto poses = static_cast<Eigen::Index>(landmark.poses.size());
   LinearSystem rows{Eigen::MatrixXd::Zero(3 * views, 3 + 6 * poses),
                     Eigen::VectorXd::Zero(3 * views)};
-  Eigen::Index column = 3;
   for (Eigen::Index i = 0; i < views; ++i) {
     const LandmarkView& view = landmark.views[static_cast<std::size_t>(i)];
     if (view.usable) {
       rows.jacobian.block<3, 3>(3 * i, 0) = view.by_point;
       rows.residual.segment<3>(3 * i) = view.residual;
-      if (!view.fixed) rows.jacobian.block<3, 6>(3 * i, column) = view.by_pose;
+      if (view.fixed) continue;
+      const auto pose = std::find(landmark.poses.begin(), landmark.poses.end(), view.pose);
+      const Eigen::Index column = 3 + 6 * (pose - landmark.poses.begin());
+      rows.jacobian.block<3, 6>(3 * i, column) = view.by_pose;
     }
-    if (!view.fixed) column += 6;
   }
   return marginalize(rows, 3);
 }

@@ -6,9 +6,13 @@
 
 #include <Eigen/Cholesky>
 
+#include "backend/problem/measurement_fault.h"
+
 namespace hybrid_slam {
 
 namespace {
+
+constexpr const char* kNoFrame = "no such frame";
 
 std::string fault(const char* what, std::size_t index, const char* reason) {
   return std::string(what) + " " + std::to_string(index) + ": " + reason;
@@ -20,25 +24,17 @@ bool is_stereo(const Camera& camera) {
 
 // Null if all is well.
 const char* fault_of(const FactorGraph& graph, const GraphObservation& observation) {
-  if (observation.frame >= graph.frames.size()) return "no such frame";
+  if (observation.frame >= graph.frames.size()) return kNoFrame;
   if (observation.point >= graph.points.size()) return "no such point";
   const std::uint32_t camera = graph.frames[observation.frame].camera;
   if (camera >= graph.cameras.size()) return "its frame has no camera";
-  if (!observation.measurement.head<2>().allFinite()) return "measurement is not finite";
-  if (is_stereo(graph.cameras[camera].camera) && std::isinf(observation.measurement[2])) {
-    return "measurement is not finite";
-  }
-  if (!(observation.sigma > 0) || !std::isfinite(observation.sigma)) {
-    return "sigma must be positive and finite";
-  }
-  return nullptr;
+  return measurement_fault(observation, graph.cameras[camera].camera);
 }
 
-// An edge of either kind between `count` vertices.
+// An edge of either kind.
 template <typename Edge>
-const char* edge_fault(const Edge& edge, std::size_t count) {
+const char* edge_fault(const Edge& edge) {
   constexpr double kTolerance = 1e-9;
-  if (edge.a >= count || edge.b >= count) return "no such frame";
   if (edge.a == edge.b) return "joins a frame to itself";
   if (!edge.a_from_b.params.allFinite()) return "measurement is not finite";
   const auto& information = edge.information;
@@ -51,7 +47,8 @@ const char* edge_fault(const Edge& edge, std::size_t count) {
 }
 
 const char* fault_of(const FactorGraph& graph, const GraphEdge& edge) {
-  return edge_fault(edge, graph.frames.size());
+  const std::size_t count = graph.frames.size();
+  return edge.a >= count || edge.b >= count ? kNoFrame : edge_fault(edge);
 }
 
 const char* fault_of(const FactorGraph& graph, const GraphPrior& prior) {
@@ -68,7 +65,9 @@ const char* fault_of(const FactorGraph& graph, const GraphPrior& prior) {
 }
 
 const char* fault_of(const FactorGraph& graph, const GraphSimilarityEdge& edge) {
-  const char* fault = edge_fault(edge, graph.similarities.size());
+  const std::size_t count = graph.similarities.size();
+  if (edge.a >= count || edge.b >= count) return kNoFrame;
+  const char* fault = edge_fault(edge);
   return fault == nullptr && !(edge.a_from_b.scale() > 0) ? "scale must be positive" : fault;
 }
 
@@ -110,6 +109,19 @@ std::string first_fault(const FactorGraph& graph, const std::vector<T>& items, c
 }
 
 }  // namespace
+
+const char* measurement_fault(const GraphObservation& observation, const Camera& camera) {
+  if (!observation.measurement.head<2>().allFinite()) return "measurement is not finite";
+  if (is_stereo(camera) && std::isinf(observation.measurement[2])) {
+    return "measurement is not finite";
+  }
+  if (!(observation.sigma > 0) || !std::isfinite(observation.sigma)) {
+    return "sigma must be positive and finite";
+  }
+  return nullptr;
+}
+
+const char* measurement_fault(const GraphEdge& edge) { return edge_fault(edge); }
 
 std::string FactorGraph::validate() const {
   std::string wrong = first_fault(*this, cameras, "camera");
