@@ -5,9 +5,11 @@
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "backend/problem/joint_frame.h"
 #include "factors/linear_prior.h"
 #include "factors/make_reprojection_factor.h"
 #include "factors/manifolds.h"
@@ -76,10 +78,12 @@ class Builder {
     options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.manifold_ownership = ceres::TAKE_OWNERSHIP;
     options.disable_all_safety_checks = true;  // blocks are rows of vectors of their own
-    problem_ = std::make_unique<ceres::Problem>(options);
+    made_.problem = std::make_unique<ceres::Problem>(options);
+    problem_ = made_.problem.get();
+    find_joint_frames();
   }
 
-  std::unique_ptr<ceres::Problem> build(const ProblemOptions& options, Loss observation_loss) {
+  CeresGraph build(const ProblemOptions& options, Loss observation_loss) {
     add_observations(SharedLoss(observation_loss, options.chi2_mono),
                      SharedLoss(observation_loss, options.chi2_stereo));
     add_edges(graph_.edges, factors_.edges, SharedLoss(options.loop_loss, options.chi2_loop),
@@ -94,7 +98,7 @@ class Builder {
     add_edges(graph_.similarity_edges, factors_.similarity_edges,
               SharedLoss(options.loop_loss, options.chi2_loop),
               [this](std::uint32_t i) { return similarity_block(i); });
-    return std::move(problem_);
+    return std::move(made_);
   }
 
  private:
@@ -108,8 +112,15 @@ class Builder {
       const bool refined = graph_.cameras[frame.camera].refined != 0;
       if (frame.fixed && graph_.points[observation.point].fixed && !refined) continue;
       SharedLoss& loss = residual_count(factors_, i) == 3 ? stereo : mono;
-      double* pose = pose_block(observation.frame);
       ceres::CostFunction* factor = factors_.observations[i].get();
+      if (!made_.joint_frames[observation.frame].empty()) {
+        made_.joint_factors.push_back(std::make_unique<JointFrameFactor>(*factor));
+        problem_->AddResidualBlock(made_.joint_factors.back().get(), loss.get(),
+                                   joint_block(observation.frame), point);
+        if (graph_.points[observation.point].fixed) problem_->SetParameterBlockConstant(point);
+        continue;
+      }
+      double* pose = pose_block(observation.frame);
       if (refined) {
         problem_->AddResidualBlock(factor, loss.get(), pose, point, camera_block(frame.camera));
       } else {
@@ -129,6 +140,42 @@ class Builder {
       if (problem_->IsParameterBlockConstant(a) && problem_->IsParameterBlockConstant(b)) continue;
       problem_->AddResidualBlock(factors[i].get(), edges[i].loop ? loop_loss.get() : nullptr, a, b);
     }
+  }
+
+  // Those with a refined camera that no other frame has, unless edges or priors need the pose as a
+  // block of its own.
+  void find_joint_frames() {
+    made_.joint_frames.resize(graph_.frames.size());
+    if (!graph_.edges.empty() || !graph_.priors.empty()) return;
+    std::vector<int> frames_of(graph_.cameras.size(), 0);
+    for (const GraphFrame& frame : graph_.frames) {
+      if (frame.camera != GraphFrame::kNoCamera) ++frames_of[frame.camera];
+    }
+    for (std::size_t i = 0; i < graph_.frames.size(); ++i) {
+      const GraphFrame& frame = graph_.frames[i];
+      if (frame.camera == GraphFrame::kNoCamera || frames_of[frame.camera] != 1) continue;
+      const GraphCamera& camera = graph_.cameras[frame.camera];
+      if (camera.refined == 0) continue;
+      std::vector<double>& block = made_.joint_frames[i];
+      const Vector7d& pose = frame.cam_from_world.params;
+      block.assign(pose.data(), pose.data() + 7);
+      const double* params = params_of(camera.camera);
+      block.insert(block.end(), params, params + param_count(camera.camera));
+    }
+  }
+
+  double* joint_block(std::uint32_t index) {
+    const GraphFrame& frame = graph_.frames[index];
+    double* block = made_.joint_frames[index].data();
+    if (pose_added_.empty()) pose_added_.assign(graph_.frames.size(), 0);
+    if (pose_added_[index] == 0) {
+      pose_added_[index] = 1;
+      const GraphCamera& camera = graph_.cameras[frame.camera];
+      const int count = param_count(camera.camera);
+      problem_->AddParameterBlock(block, 7 + count,
+                                  new JointFrameManifold(count, camera.refined, frame.fixed));
+    }
+    return block;
   }
 
   double* pose_block(std::uint32_t index) {
@@ -172,7 +219,8 @@ class Builder {
 
   FactorGraph& graph_;
   const GraphFactors& factors_;
-  std::unique_ptr<ceres::Problem> problem_;
+  CeresGraph made_;
+  ceres::Problem* problem_ = nullptr;
   std::vector<char> pose_added_;
   std::vector<double*> camera_blocks_;
 };
@@ -253,9 +301,22 @@ double edges_chi2(const FactorGraph& graph, const GraphFactors& factors) {
   return sum;
 }
 
-std::unique_ptr<ceres::Problem> build_ceres_problem(FactorGraph& graph, const GraphFactors& factors,
-                                                    const ProblemOptions& options,
-                                                    Loss observation_loss) {
+CeresGraph::CeresGraph() = default;
+CeresGraph::CeresGraph(CeresGraph&&) noexcept = default;
+CeresGraph::~CeresGraph() = default;
+
+void CeresGraph::write_back(FactorGraph& graph) const {
+  for (std::size_t i = 0; i < joint_frames.size(); ++i) {
+    if (joint_frames[i].empty()) continue;
+    GraphFrame& frame = graph.frames[i];
+    std::copy_n(joint_frames[i].data(), 7, frame.cam_from_world.params.data());
+    Camera& camera = graph.cameras[frame.camera].camera;
+    std::copy_n(joint_frames[i].data() + 7, param_count(camera), params_of(camera));
+  }
+}
+
+CeresGraph build_ceres_problem(FactorGraph& graph, const GraphFactors& factors,
+                               const ProblemOptions& options, Loss observation_loss) {
   return Builder(graph, factors).build(options, observation_loss);
 }
 

@@ -41,11 +41,25 @@ double edges_chi2(const FactorGraph& graph, const GraphFactors& factors);
 // Rows of the residual of an observation: 3 of a stereo measurement, else 2.
 int residual_count(const GraphFactors& factors, std::size_t observation);
 
+// A graph as Ceres solves it: on the values of the graph, but for frames that have a refined camera
+// for themselves, which are joint blocks (backend/problem/joint_frame.h) kept here.
+struct CeresGraph {
+  CeresGraph();
+  CeresGraph(CeresGraph&&) noexcept;
+  ~CeresGraph();
+
+  std::vector<std::vector<double>> joint_frames;  // as graph.frames; empty where separate
+  std::vector<std::unique_ptr<ceres::CostFunction>> joint_factors;
+  std::unique_ptr<ceres::Problem> problem;
+
+  // Joint blocks into the graph.
+  void write_back(FactorGraph& graph) const;
+};
+
 // The active terms as a Ceres problem on the estimate of `graph`; both must outlive it. What is not
 // in a term that varies is not in it.
-std::unique_ptr<ceres::Problem> build_ceres_problem(FactorGraph& graph, const GraphFactors& factors,
-                                                    const ProblemOptions& options,
-                                                    Loss observation_loss);
+CeresGraph build_ceres_problem(FactorGraph& graph, const GraphFactors& factors,
+                               const ProblemOptions& options, Loss observation_loss);
 
 // The parameter block of a camera's params.
 double* params_of(Camera& camera);

@@ -41,13 +41,17 @@ class WatchingCallback final : public ceres::IterationCallback {
 // Landmarks first, then poses and intrinsics: without it Ceres looks for an independent set by
 // itself.
 std::shared_ptr<ceres::ParameterBlockOrdering> elimination_order(FactorGraph& graph,
-                                                                 const ceres::Problem& problem) {
+                                                                 CeresGraph& built) {
+  const ceres::Problem& problem = *built.problem;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   const auto add = [&](double* block, int group) {
     if (problem.HasParameterBlock(block)) ordering->AddElementToGroup(block, group);
   };
   for (GraphPoint& point : graph.points) add(point.in_world.data(), 0);
   for (GraphFrame& frame : graph.frames) add(frame.cam_from_world.params.data(), 1);
+  for (std::vector<double>& frame : built.joint_frames) {
+    if (!frame.empty()) add(frame.data(), 1);
+  }
   for (GraphSimilarity& vertex : graph.similarities) add(vertex.cam_from_world.params.data(), 1);
   for (GraphCamera& camera : graph.cameras) add(params_of(camera.camera), 1);
   return ordering;
@@ -81,14 +85,14 @@ ceres::LinearSolverType linear_solver_of(const FactorGraph& graph, LinearSolver 
   }
 }
 
-ceres::Solver::Options solver_options(FactorGraph& graph, const ceres::Problem& problem,
+ceres::Solver::Options solver_options(FactorGraph& graph, CeresGraph& built,
                                       const ProblemOptions& options, const SolveRound& round) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = linear_solver_of(graph, options.linear_solver);
   if (solver.linear_solver_type == ceres::ITERATIVE_SCHUR) {
     solver.preconditioner_type = ceres::SCHUR_JACOBI;
   }
-  if (!graph.points.empty()) solver.linear_solver_ordering = elimination_order(graph, problem);
+  if (!graph.points.empty()) solver.linear_solver_ordering = elimination_order(graph, built);
   solver.max_num_iterations = round.iterations;
   solver.function_tolerance = round.function_tolerance;
   solver.initial_trust_region_radius = options.trust_region;
@@ -130,17 +134,18 @@ SolveOutcome solve_round(FactorGraph& graph, const GraphFactors& factors,
     outcome.text = "initial values are not finite";
     return outcome;
   }
-  const auto problem = build_ceres_problem(graph, factors, options, round.loss);
-  if (problem->NumResidualBlocks() == 0) {
+  CeresGraph built = build_ceres_problem(graph, factors, options, round.loss);
+  if (built.problem->NumResidualBlocks() == 0) {
     outcome.text = "nothing varies, or nothing was observed";
     return outcome;
   }
-  ceres::Solver::Options solver = solver_options(graph, *problem, options, round);
+  ceres::Solver::Options solver = solver_options(graph, built, options, round);
   WatchingCallback callback(stop, progress);
   solver.callbacks.push_back(&callback);
   ceres::Solver::Summary summary;
   allow_openmp_threads(options.threads > 1);
-  ceres::Solve(solver, problem.get(), &summary);
+  ceres::Solve(solver, built.problem.get(), &summary);
+  built.write_back(graph);
 
   outcome.end = end_of(summary, options);
   outcome.text = outcome.end == SolveEnd::kStopped ? "stopped on request" : summary.message;
