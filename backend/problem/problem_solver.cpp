@@ -96,6 +96,8 @@ ceres::Solver::Options solver_options(FactorGraph& graph, CeresGraph& built,
   solver.max_num_iterations = round.iterations;
   solver.function_tolerance = round.function_tolerance;
   solver.initial_trust_region_radius = options.trust_region;
+  // Steps that put points behind cameras: each shrinks the radius more than the last one, by 2^k.
+  solver.max_num_consecutive_invalid_steps = 12;
   if (options.max_seconds > 0) solver.max_solver_time_in_seconds = options.max_seconds;
   solver.num_threads = options.threads;
   solver.logging_type = ceres::SILENT;
