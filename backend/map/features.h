@@ -22,7 +22,12 @@ struct Keypoint {
 using Descriptor = std::array<std::uint8_t, 128>;
 
 // Which extractor a descriptor comes from. Kinds are never compared with one another.
-enum class DescriptorKind : std::uint8_t { kNone = 0, kRootSiftOpenCv = 1, kSynthetic = 2 };
+enum class DescriptorKind : std::uint8_t {
+  kNone = 0,
+  kRootSiftOpenCv = 1,  // by OpenCV's SIFT
+  kSynthetic = 2,
+  kRootSift = 3,  // by ours: frontend/features/definition
+};
 
 // keypoints[i] and descriptors[i] belong together.
 struct FeatureSet {

@@ -90,7 +90,7 @@ std::shared_ptr<const FrameObservations> read_frame(ByteReader& in) {
   if (frame->frame_index < 0) in.fail("negative frame index");
   frame->time = read_finite(in, "time");
   const auto kind = in.number<std::uint8_t>();
-  if (kind > static_cast<std::uint8_t>(DescriptorKind::kSynthetic))
+  if (kind > static_cast<std::uint8_t>(DescriptorKind::kRootSift))
     in.fail("unknown kind of descriptor");
   FeatureSet& features = frame->features;
   features.kind = static_cast<DescriptorKind>(kind);

@@ -4,23 +4,27 @@
 #include <string>
 
 #include "backend/map/features.h"
+#include "frontend/features/definition/parameters.h"
 #include "frontend/features/image.h"
 
 namespace hybrid_slam {
 
 struct SiftOptions {
-  int max_features = 2000;          // the N strongest, spread over the image
-  int octave_layers = 3;            // scales per octave
-  double contrast_threshold = 1.2;  // smallest |difference of Gaussians|, grey levels 0..255
-  double edge_threshold = 10;       // largest ratio of principal curvatures
-  double initial_sigma = 1.6;       // blur of the first level [px]
-  bool upsample = true;             // start with an octave at twice the resolution
+  int max_features = 2000;                               // the N strongest, spread over the image
+  int octave_layers = sift::kLayers;                     // scales per octave
+  double contrast_threshold = sift::kContrastThreshold;  // |difference of Gaussians|, 0..255
+  double edge_threshold = sift::kEdgeThreshold;          // largest ratio of principal curvatures
+  double initial_sigma = sift::kInitialSigma;            // blur of the first level [px]
+  bool upsample = true;  // start with an octave at twice the resolution
   // Standard deviation of a small feature's position [px]. That of a feature of scale s [px] is
   // keypoint_sigma * sqrt(1 + (s / 4)^2): measured from the row differences of stereo matches, it
   // does not grow in proportion to the scale but starts flat (rendered pairs: 0.09 px up to scale
   // 4, 0.26 at 6.8, 0.38 at 9.5; KITTI: 0.32 at 0.85, 0.36 at 1.7, 0.46 at 3.4, 0.53 at 4.8, 0.68
   // at 14). The default leaves room for change of view.
   double keypoint_sigma = 0.5;
+
+  // Standard deviation of the position of a feature of this scale [px].
+  float position_sigma(float scale) const;
 
   // Empty if the values can be used, else what is wrong.
   std::string validate() const;
@@ -36,7 +40,12 @@ class SiftExtractor {
   virtual FeatureSet extract(const GrayImage& image, const GrayImage* mask) = 0;
 };
 
-// Throws std::invalid_argument if the options are not valid.
+// The engine for CPUs. Throws std::invalid_argument if the options are not valid.
 std::unique_ptr<SiftExtractor> make_sift(const SiftOptions& options);
+
+// For engines: the options themselves, unless they are not valid (std::invalid_argument) ...
+const SiftOptions& checked(const SiftOptions& options);
+// ... and nothing, unless sizes do not fit (std::logic_error).
+void check_sizes(const GrayImage& image, const GrayImage* mask);
 
 }  // namespace hybrid_slam

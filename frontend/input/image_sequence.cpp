@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include <opencv2/core.hpp>
+
 #include "frontend/input/file_sequence.h"
 
 namespace hybrid_slam {
@@ -40,6 +42,7 @@ const char* expected_files(SequenceLayout layout) {
 
 std::unique_ptr<ImageSequence> open_sequence(const std::string& path, SequenceLayout layout,
                                              const std::string& name, TruthConvention convention) {
+  cv::setNumThreads(1);  // OpenCV's setting is global; threads are the pipeline's to make
   try {
     if (!fs::is_directory(path)) throw InputError(path + ": no such folder");
     auto sequence = open_layout(path, layout, name, convention);

@@ -4,68 +4,34 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <catch2/catch.hpp>
+#include "test/frontend/features/test_images.h"
+#include "test/support/opencv_sift.h"
 
 namespace hybrid_slam {
 namespace {
 
-GrayImage to_image(int width, int height, const std::function<double(double, double)>& value) {
-  GrayImage image{width, height, {}};
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const double v = std::clamp(std::round(value(x, y)), 0.0, 255.0);
-      image.pixels.push_back(static_cast<std::uint8_t>(v));
-    }
-  }
-  return image;
-}
-
-struct Blob {
-  double x, y, sigma;
+struct Engine {
+  std::string name;
+  DescriptorKind kind;
+  std::function<std::unique_ptr<SiftExtractor>(const SiftOptions&)> make;
 };
 
-GrayImage blob_image(int width, int height, const std::vector<Blob>& blobs, double amplitude) {
-  return to_image(width, height, [&](double x, double y) {
-    double sum = 60;
-    for (const Blob& b : blobs) {
-      const double r2 = (x - b.x) * (x - b.x) + (y - b.y) * (y - b.y);
-      sum += amplitude * std::exp(-r2 / (2 * b.sigma * b.sigma));
-    }
-    return sum;
-  });
-}
-
-// Noise smoothed to random texture.
-GrayImage texture(int width, int height, unsigned seed) {
-  std::mt19937 random(seed);
-  std::vector<Blob> blobs;
-  std::vector<double> signs;
-  for (int i = 0; i < width * height / 60; ++i) {
-    const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
-    blobs.push_back({width * unit(), height * unit(), 1 + 3 * unit()});
-    signs.push_back(unit() < 0.5 ? -40 : 40);
-  }
-  std::vector<double> sums(static_cast<std::size_t>(width * height), 128);
-  for (std::size_t i = 0; i < blobs.size(); ++i) {
-    const Blob& b = blobs[i];
-    const int reach = static_cast<int>(4 * b.sigma);
-    for (int y = std::max(0, static_cast<int>(b.y) - reach);
-         y < std::min(height, static_cast<int>(b.y) + reach); ++y) {
-      for (int x = std::max(0, static_cast<int>(b.x) - reach);
-           x < std::min(width, static_cast<int>(b.x) + reach); ++x) {
-        const double r2 = (x - b.x) * (x - b.x) + (y - b.y) * (y - b.y);
-        sums[static_cast<std::size_t>(y * width + x)] +=
-            signs[i] * std::exp(-r2 / (2 * b.sigma * b.sigma));
-      }
-    }
-  }
-  return to_image(width, height, [&](double x, double y) {
-    return sums[static_cast<std::size_t>(static_cast<int>(y) * width + static_cast<int>(x))];
-  });
+// What holds for every engine is tested on every one. OpenCV's is the reference for the others, and
+// what the tests ask for is no more than it gives.
+const std::vector<Engine>& engines() {
+  static const std::vector<Engine> kEngines = {
+      {"ours", DescriptorKind::kRootSift, make_sift},
+      {"OpenCV", DescriptorKind::kRootSiftOpenCv, make_opencv_sift},
+  };
+  return kEngines;
 }
 
 bool same_bytes(const FeatureSet& a, const FeatureSet& b) {
@@ -83,43 +49,10 @@ const Keypoint* nearest(const FeatureSet& features, const Blob& blob, double rad
   return best;
 }
 
-TEST_CASE("SIFT finds blobs of every size where they are") {
-  std::mt19937 random(7);
-  const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
-  for (const double sigma : {1.5, 2.0, 2.5, 3.6, 5.0, 8.0}) {
-    std::vector<Blob> blobs;
-    const double spacing = std::max(30.0, 12 * sigma);
-    for (int row = 0; row < 5; ++row) {
-      for (int column = 0; column < 8; ++column) {
-        blobs.push_back(
-            {(column + 1) * spacing + 8 * unit(), (row + 1) * spacing + 8 * unit(), sigma});
-      }
-    }
-    const GrayImage image =
-        blob_image(static_cast<int>(9 * spacing), static_cast<int>(6 * spacing), blobs, 120);
-    const FeatureSet features = make_sift({})->extract(image, nullptr);
-    double sum_x = 0, sum_y = 0, largest = 0;
-    for (const Blob& blob : blobs) {
-      const Keypoint* k = nearest(features, blob, 1.0);
-      REQUIRE(k);
-      sum_x += k->x - blob.x;
-      sum_y += k->y - blob.y;
-      largest = std::max({largest, std::abs(k->x - blob.x), std::abs(k->y - blob.y)});
-    }
-    const auto count = static_cast<double>(blobs.size());
-    INFO("sigma " << sigma << ": mean error " << sum_x / count << ", " << sum_y / count
-                  << ", largest " << largest);
-    CHECK(std::abs(sum_x / count) < 0.02);
-    CHECK(std::abs(sum_y / count) < 0.02);
-    CHECK(largest < 0.1 * std::max(1.0, sigma));
-  }
-}
-
-// Peak |difference of Gaussians| of a blob, in grey levels, over continuous scale. `input_blur`:
-// what SIFT takes the image to carry already.
+// Peak |difference of Gaussians| of a blob, in grey levels, over continuous scale.
 double peak_response(double amplitude, double sigma, int layers, double* scale) {
   const double k = std::exp2(1.0 / layers);
-  constexpr double kInputBlur2 = 0.25;
+  constexpr double kInputBlur2 = sift::kImageBlur * sift::kImageBlur;
   double best = 0;
   for (double s = 0.5; s < 20; s += 0.001) {
     const double s2 = sigma * sigma;
@@ -134,6 +67,8 @@ double peak_response(double amplitude, double sigma, int layers, double* scale) 
 }
 
 TEST_CASE("SIFT's response is in grey levels, its scale in pixels, its threshold in both senses") {
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
   const Blob blob{50.3, 50.4, 3.0};
   const GrayImage image = blob_image(101, 101, {blob}, 100);
   for (const int layers : {3, 5}) {
@@ -141,7 +76,7 @@ TEST_CASE("SIFT's response is in grey levels, its scale in pixels, its threshold
     const double expected = peak_response(100, blob.sigma, layers, &scale);
     SiftOptions options;
     options.octave_layers = layers;
-    const FeatureSet features = make_sift(options)->extract(image, nullptr);
+    const FeatureSet features = engine.make(options)->extract(image, nullptr);
     const Keypoint* k = nearest(features, blob, 1.0);
     REQUIRE(k);
     CHECK(k->response == Approx(expected).epsilon(0.03));
@@ -149,13 +84,15 @@ TEST_CASE("SIFT's response is in grey levels, its scale in pixels, its threshold
     CHECK(k->sigma == Approx(0.5 * std::sqrt(1 + k->scale * k->scale / 16)));
 
     options.contrast_threshold = 0.97 * k->response;
-    CHECK(nearest(make_sift(options)->extract(image, nullptr), blob, 1.0) != nullptr);
+    CHECK(nearest(engine.make(options)->extract(image, nullptr), blob, 1.0) != nullptr);
     options.contrast_threshold = 1.03 * k->response;
-    CHECK(nearest(make_sift(options)->extract(image, nullptr), blob, 1.0) == nullptr);
+    CHECK(nearest(engine.make(options)->extract(image, nullptr), blob, 1.0) == nullptr);
   }
 }
 
 TEST_CASE("SIFT's angle turns from +x towards +y") {
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
   for (int degrees = 15; degrees < 360; degrees += 30) {
     const double angle = degrees * std::numbers::pi / 180;
     const Blob blob{60, 60, 3.0};
@@ -165,7 +102,7 @@ TEST_CASE("SIFT's angle turns from +x towards +y") {
       const double r2 = (x - blob.x) * (x - blob.x) + (y - blob.y) * (y - blob.y);
       return 128 + along + 60 * std::exp(-r2 / (2 * blob.sigma * blob.sigma));
     });
-    const FeatureSet features = make_sift({})->extract(image, nullptr);
+    const FeatureSet features = engine.make({})->extract(image, nullptr);
     double closest = 10;
     for (const Keypoint& k : features.keypoints) {
       if (std::hypot(k.x - blob.x, k.y - blob.y) > 3) continue;
@@ -178,10 +115,12 @@ TEST_CASE("SIFT's angle turns from +x towards +y") {
 }
 
 TEST_CASE("SIFT's descriptors are RootSIFT of length 512") {
-  const FeatureSet features = make_sift({})->extract(texture(320, 240, 3), nullptr);
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
+  const FeatureSet features = engine.make({})->extract(texture(320, 240, 3), nullptr);
   REQUIRE(features.size() > 100);
   REQUIRE(features.descriptors.size() == features.size());
-  CHECK(features.kind == DescriptorKind::kRootSiftOpenCv);
+  CHECK(features.kind == engine.kind);
   for (const Descriptor& descriptor : features.descriptors) {
     double sum = 0;
     for (const std::uint8_t byte : descriptor) sum += byte * byte;
@@ -190,24 +129,28 @@ TEST_CASE("SIFT's descriptors are RootSIFT of length 512") {
 }
 
 TEST_CASE("SIFT repeats itself bit for bit, in one instance and in another") {
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
   const GrayImage image = texture(320, 240, 4);
   SiftOptions options;
   options.max_features = 300;
-  const auto one = make_sift(options);
+  const auto one = engine.make(options);
   const FeatureSet first = one->extract(image, nullptr);
   REQUIRE(first.size() == 300);
   one->extract(texture(100, 90, 5), nullptr);
   CHECK(same_bytes(first, one->extract(image, nullptr)));
-  CHECK(same_bytes(first, make_sift(options)->extract(image, nullptr)));
+  CHECK(same_bytes(first, engine.make(options)->extract(image, nullptr)));
 }
 
 TEST_CASE("SIFT describes a feature alike whatever else was found") {
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
   const GrayImage image = texture(320, 240, 4);
   SiftOptions options;
   options.max_features = 100000;
-  const FeatureSet all = make_sift(options)->extract(image, nullptr);
+  const FeatureSet all = engine.make(options)->extract(image, nullptr);
   options.max_features = 200;
-  const FeatureSet some = make_sift(options)->extract(image, nullptr);
+  const FeatureSet some = engine.make(options)->extract(image, nullptr);
   REQUIRE(all.size() > 400);
   REQUIRE(some.size() == 200);
   std::set<Descriptor> described(all.descriptors.begin(), all.descriptors.end());
@@ -215,10 +158,12 @@ TEST_CASE("SIFT describes a feature alike whatever else was found") {
 }
 
 TEST_CASE("SIFT keeps out of the mask") {
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
   const GrayImage image = texture(320, 240, 6);
   GrayImage mask{320, 240, std::vector<std::uint8_t>(320 * 240, 255)};
   for (int y = 0; y < 240; ++y) std::fill_n(mask.row(y) + 100, 80, std::uint8_t{0});
-  const FeatureSet features = make_sift({})->extract(image, &mask);
+  const FeatureSet features = engine.make({})->extract(image, &mask);
   int left = 0, right = 0;
   for (const Keypoint& k : features.keypoints) {
     CHECK((k.x < 99.5 || k.x > 179.5));
@@ -230,7 +175,9 @@ TEST_CASE("SIFT keeps out of the mask") {
 }
 
 TEST_CASE("SIFT finds nothing where there is nothing") {
-  const auto sift = make_sift({});
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
+  const auto sift = engine.make({});
   for (const int size : {0, 1, 7, 11, 12, 13, 64, 300}) {
     const GrayImage flat{size, size,
                          std::vector<std::uint8_t>(static_cast<std::size_t>(size * size), 90)};
@@ -241,27 +188,31 @@ TEST_CASE("SIFT finds nothing where there is nothing") {
 }
 
 TEST_CASE("SIFT without upsampling leaves out the finest features") {
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
   const std::vector<Blob> blobs = {{60.3, 60.2, 1.5}, {160.1, 60.4, 6.0}};
   const GrayImage image = blob_image(220, 121, blobs, 120);
   SiftOptions options;
-  CHECK(nearest(make_sift(options)->extract(image, nullptr), blobs[0], 1) != nullptr);
+  CHECK(nearest(engine.make(options)->extract(image, nullptr), blobs[0], 1) != nullptr);
   options.upsample = false;
-  const FeatureSet features = make_sift(options)->extract(image, nullptr);
+  const FeatureSet features = engine.make(options)->extract(image, nullptr);
   CHECK(nearest(features, blobs[0], 1) == nullptr);
   CHECK(nearest(features, blobs[1], 1) != nullptr);
 }
 
 TEST_CASE("SIFT refuses options and images that cannot be") {
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
   SiftOptions options;
   options.max_features = 0;
-  CHECK_THROWS_AS(make_sift(options), std::invalid_argument);
+  CHECK_THROWS_AS(engine.make(options), std::invalid_argument);
   options = {};
   options.contrast_threshold = std::nan("");
-  CHECK_THROWS_AS(make_sift(options), std::invalid_argument);
+  CHECK_THROWS_AS(engine.make(options), std::invalid_argument);
   const GrayImage image = texture(40, 40, 1);
   const GrayImage mask = texture(40, 39, 1);
-  CHECK_THROWS_AS(make_sift({})->extract(image, &mask), std::logic_error);
-  CHECK_THROWS_AS(make_sift({})->extract({40, 40, {}}, nullptr), std::logic_error);
+  CHECK_THROWS_AS(engine.make({})->extract(image, &mask), std::logic_error);
+  CHECK_THROWS_AS(engine.make({})->extract({40, 40, {}}, nullptr), std::logic_error);
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include "test/support/opencv_sift.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -7,7 +9,6 @@
 #include <opencv2/features2d.hpp>
 
 #include "frontend/features/feature_selection.h"
-#include "frontend/features/sift.h"
 
 namespace hybrid_slam {
 namespace {
@@ -17,9 +18,6 @@ namespace {
 // place is thus 1/4 px too far right and down, whatever its octave: the octaves drop every other
 // pixel of the doubled image and keep its origin.
 constexpr float kUpsamplingOffset = 0.25F;
-
-// Where the uncertainty of a position begins to grow with the scale [px]; see SiftOptions.
-constexpr float kScaleOfGrowth = 4.0F;
 
 // Below this OpenCV has no octave to search.
 constexpr int kMinImageSize = 12;
@@ -50,7 +48,7 @@ Descriptor to_root_sift(const float* sift) {
 class OpenCvSift final : public SiftExtractor {
  public:
   explicit OpenCvSift(const SiftOptions& options)
-      : options_(options),
+      : options_(checked(options)),
         // OpenCV compares |difference of Gaussians| / 255 * layers with its threshold.
         sift_(cv::SIFT::create(0, options.octave_layers,
                                options.contrast_threshold * options.octave_layers / 255.0,
@@ -59,7 +57,7 @@ class OpenCvSift final : public SiftExtractor {
   }
 
   FeatureSet extract(const GrayImage& image, const GrayImage* mask) override {
-    check(image, mask);
+    check_sizes(image, mask);
     FeatureSet features;
     features.kind = DescriptorKind::kRootSiftOpenCv;
     if (std::min(image.width, image.height) < kMinImageSize) return features;
@@ -85,16 +83,6 @@ class OpenCvSift final : public SiftExtractor {
   }
 
  private:
-  static void check(const GrayImage& image, const GrayImage* mask) {
-    const auto size =
-        static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-    if (image.pixels.size() != size) throw std::logic_error("image: size and pixels disagree");
-    if (mask && (mask->width != image.width || mask->height != image.height ||
-                 mask->pixels.size() != size)) {
-      throw std::logic_error("mask: not the size of the image");
-    }
-  }
-
   template <typename T>
   static void keep(const std::vector<int>& selected, std::vector<T>* items) {
     std::vector<T> kept;
@@ -111,8 +99,7 @@ class OpenCvSift final : public SiftExtractor {
     keypoint.angle = found.angle * static_cast<float>(std::numbers::pi / 180);
     if (keypoint.angle >= static_cast<float>(2 * std::numbers::pi)) keypoint.angle = 0;
     keypoint.response = found.response * 255;
-    keypoint.sigma = static_cast<float>(options_.keypoint_sigma) *
-                     std::hypot(1.0F, keypoint.scale / kScaleOfGrowth);
+    keypoint.sigma = options_.position_sigma(keypoint.scale);
     return keypoint;
   }
 
@@ -140,23 +127,7 @@ class OpenCvSift final : public SiftExtractor {
 
 }  // namespace
 
-std::string SiftOptions::validate() const {
-  const auto positive = [](double value) { return std::isfinite(value) && value > 0; };
-  if (max_features < 1) return "max_features must be positive";
-  if (octave_layers < 1 || octave_layers > 10) return "octave_layers must lie in 1..10";
-  if (!std::isfinite(contrast_threshold) || contrast_threshold < 0) {
-    return "contrast_threshold must not be negative";
-  }
-  if (!positive(edge_threshold)) return "edge_threshold must be positive";
-  if (!positive(initial_sigma)) return "initial_sigma must be positive";
-  if (!positive(keypoint_sigma)) return "keypoint_sigma must be positive";
-  return {};
-}
-
-std::unique_ptr<SiftExtractor> make_sift(const SiftOptions& options) {
-  if (const std::string error = options.validate(); !error.empty()) {
-    throw std::invalid_argument("SIFT options: " + error);
-  }
+std::unique_ptr<SiftExtractor> make_opencv_sift(const SiftOptions& options) {
   return std::make_unique<OpenCvSift>(options);
 }
 

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <vector>
+
+#include "frontend/features/cpu/scale_space.h"
+#include "frontend/features/sift.h"
+
+namespace hybrid_slam {
+
+// SIFT as defined in frontend/features/definition, on one thread. What a stage needs of the one
+// before it stays in the instance, so that benchmarks can run the stages one by one; extract() is
+// all of them in their order.
+class CpuSift final : public SiftExtractor {
+ public:
+  // Throws std::invalid_argument if the options are not valid.
+  explicit CpuSift(const SiftOptions& options);
+
+  FeatureSet extract(const GrayImage& image, const GrayImage* mask) override;
+
+  // All extrema outside of the mask.
+  const std::vector<sift::Extremum>& detect(const GrayImage& image, const GrayImage* mask);
+
+  // Of the extrema last detected, those that select_spread() keeps.
+  std::vector<sift::Extremum> select() const;
+
+  // A feature for each angle of each extremum; of these, those that select_spread() keeps.
+  struct Oriented {
+    std::vector<Keypoint> keypoints;
+    std::vector<const sift::Extremum*> extrema;  // keypoints[i] belongs to *extrema[i]
+  };
+  Oriented orient(const std::vector<sift::Extremum>& extrema) const;
+
+  std::vector<Descriptor> describe(const Oriented& features) const;
+
+ private:
+  Keypoint keypoint_of(const sift::Extremum& extremum) const;
+
+  SiftOptions options_;
+  sift::ScaleSpace scale_space_;
+  int width_ = 0;  // of the image last given
+  int height_ = 0;
+  std::vector<sift::Extremum> extrema_;
+};
+
+}  // namespace hybrid_slam

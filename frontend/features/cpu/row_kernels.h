@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// What the CPU engine does with whole rows of samples, in vectors of what the machine has. Rows of
+// floats can be read and written up to kRowPadding samples beyond `width`; what stands there is of
+// no account.
+
+namespace hybrid_slam::sift {
+
+constexpr std::size_t kRowPadding = 16;
+
+// out[x] = sum over i of weights[i] * rows[i][x], for symmetric weights (weights[i] = weights[count
+// - 1 - i]). Rows of an image make a blur along its columns, one row shifted along itself (rows[i]
+// = row + i - count / 2) a blur along the row. `out` is none of the rows.
+void symmetric_sum(const float* const* rows, std::size_t count, const float* weights,
+                   std::size_t width, float* out);
+
+// The same, and difference[x] = out[x] - below[x].
+void symmetric_sum_and_difference(const float* const* rows, std::size_t count, const float* weights,
+                                  std::size_t width, float* out, const float* below,
+                                  float* difference);
+
+// out[x] = in[x].
+void to_floats(const std::uint8_t* in, std::size_t width, float* out);
+
+// out[2 x] = even[x], out[2 x + 1] = odd[x], 2 * width samples.
+void interleave(const float* even, const float* odd, std::size_t width, float* out);
+
+// Columns x of first .. last - 1, ascending, whose neighbourhood (definition/extremum.h; rows[i]
+// points at column 0) is an extremum with |value| > threshold, which is not negative. `found` has
+// room for last - first columns; returns how many there are.
+std::size_t find_extrema(const float* const* rows, std::size_t first, std::size_t last,
+                         float threshold, int* found);
+
+}  // namespace hybrid_slam::sift

@@ -1,0 +1,166 @@
+#include "frontend/features/cpu/scale_space.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace hybrid_slam::sift {
+namespace {
+
+// Rows above and below an extremum that its refinement may read.
+constexpr int kSearchReach = kMaxMoves + 1;
+
+auto place(const RefinedExtremum& e) { return std::tuple(e.layer, e.y, e.x); }
+
+}  // namespace
+
+ScaleSpace::ScaleSpace(const SiftOptions& options)
+    : layers_(options.octave_layers),
+      upsample_(options.upsample),
+      initial_sigma_(options.initial_sigma),
+      contrast_threshold_(static_cast<float>(options.contrast_threshold)),
+      edge_threshold_(static_cast<float>(options.edge_threshold)) {
+  lags_.push_back(0);
+  for (int level = 1; level < layers_ + 3; ++level) {
+    kernels_.emplace_back(level_step_sigma(initial_sigma_, layers_, level), KernelCentre::kSample);
+    lags_.push_back(lags_.back() + kernels_.back().reach());
+  }
+  pointers_.resize(kernels_.back().weights.size());
+}
+
+ScaleSpace::Octave ScaleSpace::make_octave(int index) const {
+  const int width = octave_size(width_, index);
+  const int height = octave_size(height_, index);
+  Octave octave{index, width, height, {}, {}, PaddedRow(width, kernels_.back().reach())};
+  const int levels = layers_ + 3;
+  for (int level = 0; level < levels; ++level) {
+    const bool from_image = level == 0 && index == (upsample_ ? -1 : 0);
+    const bool whole = level == 0 ? !from_image : level <= layers_;
+    const int read = level + 1 < levels ? kernels_[static_cast<std::size_t>(level)].size() : 1;
+    octave.levels.emplace_back(width, whole ? height : std::min(read, height));
+  }
+  for (std::size_t k = 0; k + 1 < octave.levels.size(); ++k) {
+    const int waiting = lags_.back() - lags_[k + 1];
+    octave.differences.emplace_back(width, std::min(waiting + 2 * kSearchReach + 1, height));
+  }
+  return octave;
+}
+
+void ScaleSpace::prepare(int width, int height) {
+  if (width == width_ && height == height_) return;
+  width_ = width;
+  height_ = height;
+  octaves_.clear();
+  first_level_.emplace(initial_sigma_, upsample_, width, height);
+  for (int index = upsample_ ? -1 : 0;; ++index) {
+    const int side = std::min(octave_size(width, index), octave_size(height, index));
+    if (side < kMinOctaveSize) break;
+    octaves_.push_back(make_octave(index));
+  }
+  columns_.resize(octaves_.empty() ? 0 : static_cast<std::size_t>(octaves_.front().width));
+}
+
+const std::vector<Extremum>& ScaleSpace::detect(const GrayImage& image) {
+  extrema_.clear();
+  if (std::min(image.width, image.height) < kMinOctaveSize) return extrema_;
+  prepare(image.width, image.height);
+  for (std::size_t octave = 0; octave < octaves_.size(); ++octave) pass(image, octave);
+  return extrema_;
+}
+
+LevelView ScaleSpace::level(int octave, int level) const {
+  const Octave& of = octaves_.at(static_cast<std::size_t>(octave));
+  const RowStore& rows = of.levels.at(static_cast<std::size_t>(level));
+  return {rows.row(0), static_cast<long>(rows.stride()), of.width, of.height};
+}
+
+void ScaleSpace::pass(const GrayImage& image, std::size_t number) {
+  Octave& octave = octaves_[number];
+  Octave* const next = number + 1 < octaves_.size() ? &octaves_[number + 1] : nullptr;
+  const auto doubled_blur = static_cast<std::size_t>(layers_);
+  const int search_lag = lags_.back() + kSearchReach;
+  refined_.clear();
+  for (int time = 0; time < octave.height + search_lag; ++time) {
+    if (number == 0 && time < octave.height) {
+      first_level_->make_row(image, time, octave.levels[0].row(time));
+    }
+    for (std::size_t level = 1; level < octave.levels.size(); ++level) {
+      const int y = time - lags_[level];
+      if (y < 0 || y >= octave.height) continue;
+      make_level_row(octave, level, y);
+      if (level != doubled_blur || next == nullptr || y % 2 == 1) continue;
+      const float* from = octave.levels[level].row(y);
+      float* to = next->levels[0].row(y / 2);
+      for (int x = 0; x < next->width; ++x) to[x] = from[2 * x];
+    }
+    const int y = time - search_lag;
+    if (y >= kBorder && y < octave.height - kBorder) search_row(octave, y);
+  }
+  collect(octave, static_cast<int>(number));
+}
+
+void ScaleSpace::make_level_row(Octave& octave, std::size_t level, int y) {
+  const Kernel& kernel = kernels_[level - 1];
+  const RowStore& below = octave.levels[level - 1];
+  const auto width = static_cast<std::size_t>(octave.width);
+  for (int i = 0; i < kernel.size(); ++i) {
+    const int row = mirrored(y + i - kernel.reach(), octave.height);
+    pointers_[static_cast<std::size_t>(i)] = below.row(row);
+  }
+  symmetric_sum(pointers_.data(), kernel.weights.size(), kernel.weights.data(), width,
+                octave.blurred.samples());
+  octave.blurred.mirror();
+  const float* first = octave.blurred.samples() - kernel.reach();
+  for (std::size_t i = 0; i < kernel.weights.size(); ++i) pointers_[i] = first + i;
+  symmetric_sum_and_difference(pointers_.data(), kernel.weights.size(), kernel.weights.data(),
+                               width, octave.levels[level].row(y), below.row(y),
+                               octave.differences[level - 1].row(y));
+}
+
+void ScaleSpace::search_row(const Octave& octave, int y) {
+  const auto rows_at = [&](int layer, int row, int column, const float** rows) {
+    for (int i = 0; i < 9; ++i) {
+      const auto k = static_cast<std::size_t>(layer + i / 3 - 1);
+      rows[i] = octave.differences[k].row(row + i % 3 - 1) + column;
+    }
+  };
+  const ExtremumLimits limits{layers_, octave.height, octave.width, contrast_threshold_,
+                              edge_threshold_};
+  for (int layer = 1; layer <= layers_; ++layer) {
+    const float* rows[9];
+    rows_at(layer, y, 0, rows);
+    const std::size_t count =
+        find_extrema(rows, kBorder, static_cast<std::size_t>(octave.width - kBorder),
+                     kSampleContrast * contrast_threshold_, columns_.data());
+    for (std::size_t i = 0; i < count; ++i) {
+      RefinedExtremum refined;
+      if (!refine_extremum(rows_at, limits, layer, y, columns_[i], &refined)) continue;
+      refined_.push_back(refined);
+    }
+  }
+}
+
+// Two samples whose refinement ends at the same one are the same extremum.
+void ScaleSpace::collect(const Octave& octave, int number) {
+  const auto before = [](const auto& a, const auto& b) { return place(a) < place(b); };
+  const auto same = [](const auto& a, const auto& b) { return place(a) == place(b); };
+  std::sort(refined_.begin(), refined_.end(), before);
+  refined_.erase(std::unique(refined_.begin(), refined_.end(), same), refined_.end());
+  const float pixels = std::exp2(static_cast<float>(octave.index));
+  for (const RefinedExtremum& r : refined_) {
+    const float layer = static_cast<float>(r.layer) + r.to_layer;
+    Extremum extremum;
+    extremum.octave = number;
+    extremum.level = std::clamp(static_cast<int>(std::lround(layer)), 1, layers_);
+    extremum.level_x = static_cast<float>(r.x) + r.to_x;
+    extremum.level_y = static_cast<float>(r.y) + r.to_y;
+    extremum.level_scale = level_sigma(static_cast<float>(initial_sigma_), layers_, layer);
+    extremum.x = extremum.level_x * pixels;
+    extremum.y = extremum.level_y * pixels;
+    extremum.scale = extremum.level_scale * pixels;
+    extremum.response = r.response;
+    extrema_.push_back(extremum);
+  }
+}
+
+}  // namespace hybrid_slam::sift
