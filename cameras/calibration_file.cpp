@@ -2,135 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <utility>
 
-#include <yaml-cpp/yaml.h>
 #include <Eigen/LU>
+
+#include "cameras/yaml_section.h"
 
 namespace hybrid_slam {
 namespace {
 
-constexpr std::size_t kMaxFileSize = 1 << 20;  // [bytes]; a calibration has a few kB
-constexpr int kMaxImageSize = 1 << 16;         // [px]
+constexpr int kMaxImageSize = 1 << 16;  // [px]
 
-// A part of a YAML file that knows where it stands, for messages.
-class Section {
- public:
-  Section(std::string file, std::string prefix, const YAML::Node& node)
-      : file_(std::move(file)), prefix_(std::move(prefix)), node_(node) {}
-
-  [[noreturn]] void fail(const std::string& key, const std::string& reason) const {
-    throw InputError(file_ + ": " + prefix_ + key + ": " + reason);
+int image_size(const YamlSection& section, const std::string& key, double value) {
+  if (!(value >= 1 && value <= kMaxImageSize) || value != std::floor(value)) {
+    section.fail(key, "is no image size");
   }
+  return static_cast<int>(value);
+}
 
-  bool has(const std::string& key) const { return static_cast<bool>(node_[key]); }
-
-  Section child(const std::string& key) const {
-    const YAML::Node node = required(key);
-    if (!node.IsMap()) fail(key, "must hold keys and values");
-    return {file_, prefix_ + key + ".", node};
-  }
-
-  double number(const std::string& key) const { return to_number(key, required(key)); }
-
-  std::string text(const std::string& key) const {
-    const YAML::Node node = required(key);
-    if (!node.IsScalar()) fail(key, "must be a word");
-    return node.Scalar();
-  }
-
-  std::vector<double> numbers(const std::string& key, std::size_t count) const {
-    const YAML::Node node = required(key);
-    if (!node.IsSequence()) fail(key, "must be a list of numbers");
-    return to_numbers(key, node, count);
-  }
-
-  // rows, cols and data, as ROS and OpenCV write a matrix.
-  std::vector<double> matrix(const std::string& key, std::size_t rows, std::size_t cols) const {
-    const Section m = child(key);
-    if (m.number("rows") != static_cast<double>(rows) ||
-        m.number("cols") != static_cast<double>(cols)) {
-      fail(key, "must be " + std::to_string(rows) + " x " + std::to_string(cols));
-    }
-    return m.numbers("data", rows * cols);
-  }
-
-  std::vector<std::vector<double>> rows(const std::string& key, std::size_t row_count,
-                                        std::size_t col_count) const {
-    const YAML::Node node = required(key);
-    if (!node.IsSequence() || node.size() != row_count) {
-      fail(key, "must have " + std::to_string(row_count) + " rows");
-    }
-    std::vector<std::vector<double>> result;
-    for (const YAML::Node& row : node) result.push_back(to_numbers(key, row, col_count));
-    return result;
-  }
-
-  int image_size(const std::string& key, double value) const {
-    if (!(value >= 1 && value <= kMaxImageSize) || value != std::floor(value)) {
-      fail(key, "is no image size");
-    }
-    return static_cast<int>(value);
-  }
-
-  // k: fx, fy, cx, cy. Width and height of 0 are unknown.
-  void check_intrinsics(const double* k, int width, int height, const std::string& key) const {
-    if (!(k[0] > 0) || !(k[1] > 0)) fail(key, "the focal length must be positive");
-    if (width > 0 && (k[2] < 0 || k[2] > width || k[3] < 0 || k[3] > height)) {
-      fail(key, "the principal point lies outside the image");
-    }
-  }
-
- private:
-  YAML::Node required(const std::string& key) const {
-    const YAML::Node node = node_[key];
-    if (!node) fail(key, "is missing");
-    return node;
-  }
-
-  double to_number(const std::string& key, const YAML::Node& node) const {
-    double value = 0;
-    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value)) {
-      fail(key, "must be a number");
-    }
-    if (!std::isfinite(value)) fail(key, "is not finite");
-    return value;
-  }
-
-  std::vector<double> to_numbers(const std::string& key, const YAML::Node& node,
-                                 std::size_t count) const {
-    if (!node.IsSequence() || node.size() != count) {
-      fail(key, "must have " + std::to_string(count) + " numbers");
-    }
-    std::vector<double> result;
-    for (const YAML::Node& item : node) result.push_back(to_number(key, item));
-    return result;
-  }
-
-  std::string file_;
-  std::string prefix_;
-  YAML::Node node_;
-};
-
-Section open_yaml(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path + ": cannot be opened");
-  std::string text(kMaxFileSize + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.empty()) throw InputError(path + ": is empty or cannot be read");
-  if (text.size() > kMaxFileSize) throw InputError(path + ": is too large for a calibration");
-  if (text.starts_with("%YAML")) {  // OpenCV's "%YAML:1.0" is not what YAML calls a directive
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    text.replace(0, end, end, ' ');
-  }
-  try {
-    const YAML::Node root = YAML::Load(text);
-    if (!root.IsMap()) throw InputError(path + ": holds no keys and values");
-    return {path, "", root};
-  } catch (const YAML::Exception& e) {
-    throw InputError(path + ": line " + std::to_string(e.mark.line + 1) + ": " + e.msg);
+// k: fx, fy, cx, cy. Width and height of 0 are unknown.
+void check_intrinsics(const YamlSection& section, const double* k, int width, int height,
+                      const std::string& key) {
+  if (!(k[0] > 0) || !(k[1] > 0)) section.fail(key, "the focal length must be positive");
+  if (width > 0 && (k[2] < 0 || k[2] > width || k[3] < 0 || k[3] > height)) {
+    section.fail(key, "the principal point lies outside the image");
   }
 }
 
@@ -140,22 +35,22 @@ struct RectifiedCamera {
   std::vector<double> p;  // 3x4
 };
 
-RectifiedCamera read_ros_camera(const Section& file) {
+RectifiedCamera read_ros_camera(const YamlSection& file) {
   RectifiedCamera camera;
-  camera.width = file.image_size("image_width", file.number("image_width"));
-  camera.height = file.image_size("image_height", file.number("image_height"));
+  camera.width = image_size(file, "image_width", file.number("image_width"));
+  camera.height = image_size(file, "image_height", file.number("image_height"));
   camera.p = file.matrix("projection_matrix", 3, 4);
   const std::vector<double>& p = camera.p;
   if (p[1] != 0 || p[4] != 0 || p[8] != 0 || p[9] != 0 || p[10] != 1 || p[11] != 0) {
     file.fail("projection_matrix", "is no rectified camera's");
   }
   const double intrinsics[4] = {p[0], p[5], p[2], p[6]};
-  file.check_intrinsics(intrinsics, camera.width, camera.height, "projection_matrix");
+  check_intrinsics(file, intrinsics, camera.width, camera.height, "projection_matrix");
   return camera;
 }
 
-KalibrCamera read_kalibr_camera(const Section& chain, const std::string& name) {
-  const Section section = chain.child(name);
+KalibrCamera read_kalibr_camera(const YamlSection& chain, const std::string& name) {
+  const YamlSection section = chain.child(name);
   KalibrCamera result;
   result.name = name;
   if (const std::string model = section.text("camera_model"); model != "pinhole") {
@@ -163,9 +58,9 @@ KalibrCamera read_kalibr_camera(const Section& chain, const std::string& name) {
   }
   const std::vector<double> k = section.numbers("intrinsics", 4);
   const std::vector<double> resolution = section.numbers("resolution", 2);
-  const int width = section.image_size("resolution", resolution[0]);
-  const int height = section.image_size("resolution", resolution[1]);
-  section.check_intrinsics(k.data(), width, height, "intrinsics");
+  const int width = image_size(section, "resolution", resolution[0]);
+  const int height = image_size(section, "resolution", resolution[1]);
+  check_intrinsics(section, k.data(), width, height, "intrinsics");
 
   const std::string distortion = section.text("distortion_model");
   if (distortion == "equidistant") {
@@ -200,7 +95,7 @@ KalibrCamera read_kalibr_camera(const Section& chain, const std::string& name) {
   return result;
 }
 
-std::vector<KalibrCamera> read_kalibr_cameras(const Section& chain) {
+std::vector<KalibrCamera> read_kalibr_cameras(const YamlSection& chain) {
   std::vector<KalibrCamera> cameras;
   for (int i = 0; chain.has("cam" + std::to_string(i)); ++i) {
     cameras.push_back(read_kalibr_camera(chain, "cam" + std::to_string(i)));
@@ -209,7 +104,7 @@ std::vector<KalibrCamera> read_kalibr_cameras(const Section& chain) {
   return cameras;
 }
 
-Calibrated<KannalaBrandt> only_fisheye(const Section& chain) {
+Calibrated<KannalaBrandt> only_fisheye(const YamlSection& chain) {
   std::optional<Calibrated<KannalaBrandt>> found;
   for (const KalibrCamera& kalibr : read_kalibr_cameras(chain)) {
     const auto* fisheye = std::get_if<Calibrated<KannalaBrandt>>(&kalibr.camera);
@@ -223,19 +118,19 @@ Calibrated<KannalaBrandt> only_fisheye(const Section& chain) {
 
 using FisheyeParams = std::array<double, KannalaBrandt::kParamCount>;
 
-FisheyeParams read_named_params(const Section& file, const std::string& prefix) {
+FisheyeParams read_named_params(const YamlSection& file, const std::string& prefix) {
   FisheyeParams params;
   const char* const names[] = {"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
   for (std::size_t i = 0; i < params.size(); ++i) params[i] = file.number(prefix + names[i]);
   return params;
 }
 
-FisheyeParams read_matrix_params(const Section& file) {
+FisheyeParams read_matrix_params(const YamlSection& file) {
   const std::vector<double> k = file.matrix("camera_matrix", 3, 3);
   if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
     file.fail("camera_matrix", "must be (fx 0 cx; 0 fy cy; 0 0 1)");
   }
-  const Section d_matrix = file.child("distortion_coefficients");
+  const YamlSection d_matrix = file.child("distortion_coefficients");
   if (d_matrix.number("rows") * d_matrix.number("cols") != 4) {
     file.fail("distortion_coefficients", "a fisheye has 4 of them");
   }
@@ -247,15 +142,15 @@ FisheyeParams read_matrix_params(const Section& file) {
 
 Calibrated<RectifiedStereo> read_ros_stereo(const std::string& left_path,
                                             const std::string& right_path) {
-  const Section left_file = open_yaml(left_path);
-  const Section right_file = open_yaml(right_path);
+  const YamlSection left_file = YamlSection::read(left_path);
+  const YamlSection right_file = YamlSection::read(right_path);
   const RectifiedCamera left = read_ros_camera(left_file);
   const RectifiedCamera right = read_ros_camera(right_file);
   if (left.width != right.width || left.height != right.height) {
     right_file.fail("image_width", "the size differs from that of " + left_path);
   }
   constexpr double kTolerance = 1e-3;  // [px]
-  for (const std::size_t i : {0, 2, 5, 6}) {
+  for (const std::size_t i : std::array<std::size_t, 4>{0, 2, 5, 6}) {
     if (std::abs(left.p[i] - right.p[i]) > kTolerance) {
       right_file.fail("projection_matrix", "the pair is not rectified: entry " + std::to_string(i) +
                                                " differs from that of " + left_path);
@@ -280,11 +175,11 @@ Calibrated<RectifiedStereo> read_ros_stereo(const std::string& left_path,
 }
 
 std::vector<KalibrCamera> read_kalibr_camchain(const std::string& path) {
-  return read_kalibr_cameras(open_yaml(path));
+  return read_kalibr_cameras(YamlSection::read(path));
 }
 
 Calibrated<KannalaBrandt> read_fisheye(const std::string& path) {
-  const Section file = open_yaml(path);
+  const YamlSection file = YamlSection::read(path);
   if (file.has("cam0")) return only_fisheye(file);
   for (const char* key : {"distortion_model", "Camera.type"}) {
     if (!file.has(key)) continue;
@@ -317,10 +212,10 @@ Calibrated<KannalaBrandt> read_fisheye(const std::string& path) {
     const std::string width = std::string(prefix) + "width";
     const std::string height = std::string(prefix) + "height";
     if (!file.has(width)) continue;
-    camera.width = file.image_size(width, file.number(width));
-    camera.height = file.image_size(height, file.number(height));
+    camera.width = image_size(file, width, file.number(width));
+    camera.height = image_size(file, height, file.number(height));
   }
-  file.check_intrinsics(camera.params.data(), camera.width, camera.height, found[0].first);
+  check_intrinsics(file, camera.params.data(), camera.width, camera.height, found[0].first);
   return camera;
 }
 

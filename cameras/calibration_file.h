@@ -10,7 +10,7 @@
 #include "cameras/input_error.h"
 
 // Readers of the calibration files in use. Each checks every value and throws InputError with one
-// line, file: key: reason. OpenCV's "%YAML:1.0" header and "!!opencv-matrix" are understood
+// line, file:line: key: reason. OpenCV's "%YAML:1.0" header and "!!opencv-matrix" are understood
 // everywhere.
 
 namespace hybrid_slam {

@@ -2,71 +2,40 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <cmath>
-#include <filesystem>
-#include <functional>
-#include <map>
-#include <type_traits>
+#include <optional>
+#include <set>
+#include <utility>
 
-#include "cameras/input_error.h"
+#include "cameras/yaml_section.h"
 
 namespace hybrid_slam {
 namespace {
 
-// One mapping of the file: every key that fields_of() names may appear in it, and no other.
+// One mapping of the file: every key that fields_of() names may appear in it, and no other. Empty
+// where the file has none.
 class Section {
  public:
-  Section(const std::string& path, const std::string& name, const YAML::Node& node)
-      : path_(path), name_(name), node_(node) {
-    if (node && !node.IsNull() && !node.IsMap()) {
-      fail(node, (name.empty() ? "the file" : name.substr(0, name.size() - 1)) +
-                     " must hold keys and values");
-    }
-  }
+  explicit Section(std::optional<YamlSection> yaml) : yaml_(std::move(yaml)) {}
 
   template <typename T>
   Section& field(const char* key, T& value) {
-    known_[key] = true;
-    if (node_ && node_.IsMap() && node_[key]) {
-      try {
-        value = node_[key].as<T>();
-      } catch (const YAML::Exception&) {
-        fail(node_[key], name_ + key + " has a value of the wrong type");
-      }
-      if constexpr (std::is_floating_point_v<T>) {
-        if (!std::isfinite(value)) fail(node_[key], name_ + key + " must be finite");
-      }
-    }
+    known_.insert(key);
+    if (yaml_ && yaml_->has(key)) value = yaml_->value<T>(key);
     return *this;
   }
 
   Section section(const char* key) {
-    known_[key] = true;
-    return {path_, name_ + key + ".", node_ && node_.IsMap() ? node_[key] : YAML::Node()};
+    known_.insert(key);
+    return Section(yaml_ && yaml_->has(key) ? std::optional(yaml_->child(key)) : std::nullopt);
   }
 
   void refuse_unknown() const {
-    if (!node_ || !node_.IsMap()) {
-      return;
-    }
-    for (const auto& entry : node_) {
-      if (!entry.first.IsScalar()) fail(entry.first, "a key must be a word");
-      const auto key = entry.first.as<std::string>();
-      if (!known_.contains(key)) {
-        fail(entry.first, "unknown key " + name_ + key);
-      }
-    }
+    if (yaml_) yaml_->refuse_all_but(known_);
   }
 
  private:
-  [[noreturn]] void fail(const YAML::Node& at, const std::string& reason) const {
-    throw InputError(path_ + ":" + std::to_string(at.Mark().line + 1) + ": " + reason);
-  }
-
-  std::string path_;
-  std::string name_;
-  YAML::Node node_;
-  std::map<std::string, bool> known_;
+  std::optional<YamlSection> yaml_;
+  std::set<std::string> known_;
 };
 
 // The same, to be written: takes the value of every field.
@@ -256,18 +225,8 @@ std::string SlamOptions::validate() const {
 }
 
 SlamOptions read_slam_options(const std::string& path) {
-  std::error_code ignored;  // a folder opens like a file and reads as an empty one
-  if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": cannot be read");
-  YAML::Node root;
-  try {
-    root = YAML::LoadFile(path);
-  } catch (const YAML::BadFile&) {
-    throw InputError(path + ": cannot be read");
-  } catch (const YAML::Exception& error) {
-    throw InputError(path + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
-  }
   SlamOptions options;
-  fields_of(Section(path, "", root), options);
+  fields_of(Section(YamlSection::read(path)), options);
   options.distribute();
   const std::string error = options.validate();
   if (!error.empty()) {

@@ -2,10 +2,10 @@
 #include <charconv>
 #include <cmath>
 
+#include "cameras/yaml_section.h"
 #include "frontend/input/file_sequence.h"
 #include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"
-#include "frontend/input/yaml_file.h"
 
 // EuRoC: mav0/cam{0,1}/{data.csv, data/, sensor.yaml}, raw images, rectified when read; truth in
 // mav0/state_groundtruth_estimate0/data.csv.
@@ -64,24 +64,22 @@ std::vector<StampedFile> read_file_list(const fs::path& camera_folder) {
 }
 
 EurocCamera read_sensor(const fs::path& path) {
-  const YAML::Node root = read_yaml(path);
-  if (yaml_text(root, "camera_model", path) != "pinhole") {
-    throw InputError(path.string() + ": camera_model: only pinhole is supported");
-  }
-  const std::string model = yaml_text(root, "distortion_model", path);
+  const YamlSection file = YamlSection::read(path.string());
+  if (file.text("camera_model") != "pinhole")
+    file.fail("camera_model", "only pinhole is supported");
+  const std::string model = file.text("distortion_model");
   if (model != "radial-tangential" && model != "radtan") {
-    throw InputError(path.string() + ": distortion_model: only radial-tangential is supported");
+    file.fail("distortion_model", "only radial-tangential is supported");
   }
-  const std::vector<double> f_and_c = yaml_numbers(root, "intrinsics", 4, path);
-  const std::vector<double> distortion = yaml_numbers(root, "distortion_coefficients", 4, path);
-  const std::vector<double> size = yaml_numbers(root, "resolution", 2, path);
-  if (!root["T_BS"].IsMap()) throw InputError(path.string() + ": T_BS: missing");
-  const std::vector<double> pose = yaml_numbers(root["T_BS"], "data", 16, path);
+  const std::vector<double> f_and_c = file.numbers("intrinsics", 4);
+  const std::vector<double> distortion = file.numbers("distortion_coefficients", 4);
+  const std::vector<double> size = file.numbers("resolution", 2);
+  const std::vector<double> pose = file.child("T_BS").numbers("data", 16);
 
   EurocCamera result;
   RawCamera& camera = result.camera;
   for (const double side : size) {
-    if (!(side >= 1 && side <= 65536)) throw InputError(path.string() + ": resolution: impossible");
+    if (!(side >= 1 && side <= 65536)) file.fail("resolution", "impossible");
   }
   camera.size = {static_cast<int>(size[0]), static_cast<int>(size[1])};
   const auto checked = make_stereo_camera(f_and_c[0], f_and_c[1], f_and_c[2], f_and_c[3], 1,
@@ -91,7 +89,7 @@ EurocCamera read_sensor(const fs::path& path) {
   camera.cx = checked.params[2];
   camera.cy = checked.params[3];
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
-  NumberRow row{root["T_BS"].Mark().line + 1, {pose.begin(), pose.begin() + 12}};
+  NumberRow row{file.line("T_BS"), {pose.begin(), pose.begin() + 12}};
   result.body_from_cam = kitti_pose(row, path);
   return result;
 }

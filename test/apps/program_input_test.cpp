@@ -148,15 +148,15 @@ TEST_CASE("a configuration that cannot be used is refused with file, line and ke
   }
   SECTION("unknown key") {
     write_text(config, "features: 400\nfeature: 3\n");
-    reason = "options.yaml:2: unknown key feature";
+    reason = "options.yaml:2: feature: unknown key";
   }
   SECTION("unknown key of a section") {
     write_text(config, "tracking:\n  keyframes:\n    min_inliers: 15\n    max_inliers: 3\n");
-    reason = "options.yaml:4: unknown key tracking.keyframes.max_inliers";
+    reason = "options.yaml:4: tracking.keyframes.max_inliers: unknown key";
   }
   SECTION("a value of the wrong type") {
     write_text(config, "sift:\n  upsample: perhaps\n");
-    reason = "options.yaml:2: sift.upsample has a value of the wrong type";
+    reason = "options.yaml:2: sift.upsample: must be true or false";
   }
   SECTION("a value out of range") {
     write_text(config, "features: 3\n");
@@ -164,19 +164,19 @@ TEST_CASE("a configuration that cannot be used is refused with file, line and ke
   }
   SECTION("a value that is not finite") {
     write_text(config, "tracking:\n  last_frame_radius: .nan\n");
-    reason = "options.yaml:2: tracking.last_frame_radius must be finite";
+    reason = "options.yaml:2: tracking.last_frame_radius: is not finite";
   }
   SECTION("a negative seed") {
     write_text(config, "seed: -1\n");
-    reason = "options.yaml:1: seed has a value of the wrong type";
+    reason = "options.yaml:1: seed: must be a whole number in range";
   }
   SECTION("a list for a section") {
     write_text(config, "\nsift: [1, 2]\n");
-    reason = "options.yaml:2: sift must hold keys and values";
+    reason = "options.yaml:2: sift: must hold keys and values";
   }
   SECTION("no keys at all") {
     write_text(config, "features 400\n");
-    reason = "options.yaml:1: the file must hold keys and values";
+    reason = "options.yaml:1: holds no keys and values";
   }
   SECTION("a key that is no word") {
     write_text(config, "[a, b]: 400\n");

@@ -140,39 +140,41 @@ TEST_CASE("ROS stereo files: values") {
 
 TEST_CASE("ROS stereo files: each fault has its line") {
   CHECK(stereo_error(kRight, kLeft) ==
-        "left.yaml: projection_matrix: left and right files are swapped");
+        "left.yaml:7: projection_matrix: left and right files are swapped");
   CHECK(stereo_error(kLeft, kLeft) ==
-        "right.yaml: projection_matrix: P[3] is 0: there is no baseline");
+        "right.yaml:7: projection_matrix: P[3] is 0: there is no baseline");
   CHECK(stereo_error(kLeft, replaced(kRight, "-130.26", "130.26")) ==
-        "right.yaml: projection_matrix: P[3] is positive: the baseline has the wrong sign (left "
+        "right.yaml:7: projection_matrix: P[3] is positive: the baseline has the wrong sign (left "
         "and right swapped?)");
   CHECK(stereo_error(kLeft, replaced(kRight, "-130.26", ".nan")) ==
-        "right.yaml: projection_matrix.data: is not finite");
+        "right.yaml:9: projection_matrix.data: is not finite");
   CHECK(stereo_error(replaced(kLeft, "868.4", "-868.4"), kRight) ==
-        "left.yaml: projection_matrix: the focal length must be positive");
+        "left.yaml:7: projection_matrix: the focal length must be positive");
   CHECK(stereo_error(replaced(kLeft, "506.3", "5063"), kRight) ==
-        "left.yaml: projection_matrix: the principal point lies outside the image");
+        "left.yaml:7: projection_matrix: the principal point lies outside the image");
   CHECK(stereo_error(replaced(kLeft, "image_width: 1024", "image_width: 0"), kRight) ==
-        "left.yaml: image_width: is no image size");
+        "left.yaml:1: image_width: is no image size");
   CHECK(stereo_error(replaced(kLeft, "image_height: 768", "height: 768"), kRight) ==
         "left.yaml: image_height: is missing");
   CHECK(stereo_error(kLeft, replaced(kRight, "391.7, 0", "391.7")) ==
-        "right.yaml: projection_matrix.data: must have 12 numbers");
+        "right.yaml:9: projection_matrix.data: must have 12 numbers");
   CHECK(stereo_error(kLeft, replaced(kRight, "391.7, 0,", "391.7, -3,")) ==
-        "right.yaml: projection_matrix: a vertical baseline is not supported");
+        "right.yaml:7: projection_matrix: a vertical baseline is not supported");
   CHECK(stereo_error(kLeft, replaced(kRight, "868.5", "abc")) ==
-        "right.yaml: projection_matrix.data: must be a number");
-  CHECK(stereo_error(kLeft, "a: [1, 2").starts_with("right.yaml: line "));
-  CHECK(stereo_error(kLeft, "") == "right.yaml: is empty or cannot be read");
-  CHECK(stereo_error(kLeft, "just words") == "right.yaml: holds no keys and values");
-  CHECK(stereo_error(kLeft, std::string((1 << 20) + 5, '#')) ==
-        "right.yaml: is too large for a calibration");
+        "right.yaml:9: projection_matrix.data: must hold numbers only");
+  CHECK(stereo_error(kLeft, "a: [1, 2").starts_with("right.yaml:1: not YAML: "));
+  CHECK(stereo_error(kLeft, "") == "right.yaml: image_width: is missing");
+  CHECK(stereo_error(kLeft, "just words") == "right.yaml:1: holds no keys and values");
+  CHECK(stereo_error(kLeft, std::string((1 << 20) + 5, '#')) == "right.yaml: is larger than 1 MB");
   CHECK(stereo_error(kLeft, replaced(kRight, "image_width: 1024", "image_width: 1000"))
-            .starts_with("right.yaml: image_width: the size differs from that of "));
+            .starts_with("right.yaml:1: image_width: the size differs from that of "));
   CHECK(stereo_error(kLeft, replaced(kRight, "506.3", "507.3"))
-            .starts_with("right.yaml: projection_matrix: the pair is not rectified: entry 2"));
+            .starts_with("right.yaml:7: projection_matrix: the pair is not rectified: entry 2"));
   CHECK(error_of([] { read_ros_stereo("/nowhere/left.yaml", "/nowhere/right.yaml"); }) ==
-        "left.yaml: cannot be opened");
+        "left.yaml: cannot be read");
+  CHECK(error_of([] {
+          read_fisheye(std::filesystem::temp_directory_path().string());
+        }).ends_with(": cannot be read"));
 }
 
 TEST_CASE("Kalibr camchain: values") {
@@ -196,18 +198,18 @@ TEST_CASE("Kalibr camchain: values") {
 
 TEST_CASE("Kalibr camchain: each fault has its line") {
   CHECK(chain_error(replaced(kChain, "camera_model: pinhole", "camera_model: omni")) ==
-        "chain.yaml: cam0.camera_model: 'omni' is not supported (pinhole is)");
+        "chain.yaml:2: cam0.camera_model: 'omni' is not supported (pinhole is)");
   CHECK(chain_error(replaced(kChain, "equidistant", "fov")) ==
-        "chain.yaml: cam1.distortion_model: 'fov' is not supported (equidistant, radtan, none "
+        "chain.yaml:16: cam1.distortion_model: 'fov' is not supported (equidistant, radtan, none "
         "are)");
   CHECK(chain_error(replaced(kChain, "[460.0, 461.0, ", "[460.0, ")) ==
-        "chain.yaml: cam0.intrinsics: must have 4 numbers");
+        "chain.yaml:3: cam0.intrinsics: must have 4 numbers");
   CHECK(chain_error(replaced(kChain, "-1.0, 0.0, 0.1", "-1.1, 0.0, 0.1")) ==
-        "chain.yaml: cam1.T_cn_cnm1: is no rigid transform");
+        "chain.yaml:10: cam1.T_cn_cnm1: is no rigid transform");
   CHECK(chain_error(replaced(kChain, "resolution", "size")) ==
         "chain.yaml: cam0.resolution: is missing");
   CHECK(chain_error("cam3: {}\n") == "chain.yaml: cam0: is missing");
-  CHECK(chain_error("cam0: 3\n") == "chain.yaml: cam0: must hold keys and values");
+  CHECK(chain_error("cam0: 3\n") == "chain.yaml:1: cam0: must hold keys and values");
 }
 
 TEST_CASE("Fisheye: the same numbers from every kind of file") {
@@ -226,20 +228,20 @@ TEST_CASE("Fisheye: the same numbers from every kind of file") {
 
 TEST_CASE("Fisheye: each fault has its line") {
   CHECK(fisheye_error(kOpenCv + replaced(kPlain, "302.4", "302.5")) ==
-        "fish.yaml: camera_matrix: contradicts fx");
+        "fish.yaml:5: camera_matrix: contradicts fx");
   CHECK(fisheye_error(replaced(kPlain, "k3: -0.0093\n", "")) == "fish.yaml: k3: is missing");
-  CHECK(fisheye_error(replaced(kPlain, "302.7", ".inf")) == "fish.yaml: fx: is not finite");
+  CHECK(fisheye_error(replaced(kPlain, "302.7", ".inf")) == "fish.yaml:1: fx: is not finite");
   CHECK(fisheye_error(replaced(kPlain, "302.7", "0")) ==
-        "fish.yaml: fx: the focal length must be positive");
+        "fish.yaml:1: fx: the focal length must be positive");
   CHECK(fisheye_error("distortion_model: plumb_bob\n" + kPlain) ==
-        "fish.yaml: distortion_model: 'plumb_bob' is no fisheye (equidistant is)");
+        "fish.yaml:1: distortion_model: 'plumb_bob' is no fisheye (equidistant is)");
   CHECK(fisheye_error(replaced(kOpenCv, "rows: 4", "rows: 5")) ==
-        "fish.yaml: distortion_coefficients: a fisheye has 4 of them");
+        "fish.yaml:11: distortion_coefficients: a fisheye has 4 of them");
   CHECK(fisheye_error("a: 1\n") == "fish.yaml: fx: neither it nor cam0 nor camera_matrix is there");
   CHECK(fisheye_error(replaced(kChain, "equidistant", "none")) ==
-        "fish.yaml: cam0: no camera of this chain is a fisheye (pinhole, equidistant)");
+        "fish.yaml:2: cam0: no camera of this chain is a fisheye (pinhole, equidistant)");
   CHECK(fisheye_error(replaced(kChain, "radtan", "equidistant")) ==
-        "fish.yaml: cam1: is a second fisheye, and one is expected");
+        "fish.yaml:9: cam1: is a second fisheye, and one is expected");
 }
 
 TEST_CASE("Calibration of the rendered underwater dataset") {

@@ -194,13 +194,13 @@ TEST_CASE("a UWslam dataset that cannot be used is refused with one line") {
   }
   SECTION("calibration not finite") {
     replace_text(calibration / "left_camera.yaml", "data: [80.0", "data: [.nan");
-    expected = "left_camera.yaml: projection_matrix";
+    expected = "left_camera.yaml:20: projection_matrix.data: is not finite";
   }
   SECTION("calibration negative") {
     for (const char* const name : {"left_camera.yaml", "right_camera.yaml"}) {
       replace_text(calibration / name, "data: [80.0", "data: [-80.0");
     }
-    expected = "left_camera.yaml: projection_matrix";
+    expected = "left_camera.yaml:18: projection_matrix: the focal length must be positive";
   }
   SECTION("not a rectified pair") {
     replace_text(calibration / "left_camera.yaml", "0, 80.0, 21", "0, 80.0, 25");
