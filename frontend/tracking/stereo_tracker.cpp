@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "backend/map/frame_observations.h"
+#include "frontend/tracking/stereo_keyframe.h"
 
 namespace hybrid_slam {
 namespace {
@@ -29,21 +29,6 @@ void assign(const std::vector<ProjectionMatch>& matches, Frame& frame) {
 }
 
 void clear(Frame& frame) { frame.landmarks.assign(frame.size(), LandmarkId()); }
-
-// Landmarks of a keyframe that enough others have seen to be relied on; 0 if it has been culled.
-int well_founded(const MapSnapshot& map, KeyframeId id) {
-  const Keyframe* keyframe = map.find(id);
-  if (keyframe == nullptr) {
-    return 0;
-  }
-  const std::size_t min_observations = map.keyframe_count() <= 2 ? 1 : 2;
-  int count = 0;
-  for (const LandmarkId landmark : keyframe->landmarks) {
-    const Landmark* found = landmark.valid() ? map.find(landmark) : nullptr;
-    count += found != nullptr && found->observations.size() >= min_observations ? 1 : 0;
-  }
-  return count;
-}
 
 }  // namespace
 
@@ -70,36 +55,6 @@ std::string StereoTrackerOptions::validate() const {
     }
   }
   return {};
-}
-
-const char* to_string(PoseSource source) {
-  switch (source) {
-    case PoseSource::kInitialization:
-      return "initialization";
-    case PoseSource::kLocalMap:
-      return "local_map";
-    case PoseSource::kOdometer:
-      return "odometer";
-    case PoseSource::kRelocalization:
-      return "relocalization";
-    case PoseSource::kNone:
-      break;
-  }
-  return "lost";
-}
-
-const char* to_string(Prediction prediction) {
-  switch (prediction) {
-    case Prediction::kOdometer:
-      return "odometer";
-    case Prediction::kConstantVelocity:
-      return "constant_velocity";
-    case Prediction::kLastPose:
-      return "last_pose";
-    case Prediction::kNone:
-      break;
-  }
-  return "none";
 }
 
 StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStereo>& camera,
@@ -329,76 +284,29 @@ int StereoTracker::refine(Frame& frame, const MapSnapshot& map) const {
 
 bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
                                    const TrackedFrame& result) const {
-  const double close = options_.close_baselines * baseline(camera_);
-  KeyframeEvidence evidence;
-  std::vector<double> depths;
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    const double z = depth(frame, i);
-    if (std::isnan(z)) {
-      continue;
-    }
-    depths.push_back(z);
-    if (z < close) {
-      ++(frame.landmarks[i].valid() ? evidence.close_tracked : evidence.close_untracked);
-    }
-  }
-  if (depths.empty()) {
+  const auto coverage = stereo_coverage(camera_, frame, close_depth());
+  if (!coverage) {
     return false;
   }
-  std::nth_element(depths.begin(), depths.begin() + static_cast<long>(depths.size() / 2),
-                   depths.end());
+  KeyframeEvidence evidence;
   evidence.inliers = result.inliers;
-  evidence.reference_landmarks = well_founded(map, reference_);
+  evidence.reference_landmarks = count_well_founded(map, reference_);
+  evidence.close_tracked = coverage->close_tracked;
+  evidence.close_untracked = coverage->close_untracked;
   evidence.frames_since_keyframe = static_cast<int>(frame.index - last_keyframe_frame_);
   evidence.keyframes = map.keyframe_count();
-  evidence.motion = result.cam_from_reference.translation().norm() / depths[depths.size() / 2];
+  evidence.motion = result.cam_from_reference.translation().norm() / coverage->median_depth;
   evidence.by_odometry = result.source == PoseSource::kOdometer;
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);
 }
 
-// Every close point becomes a landmark, at least the nearest min_new_points.
 NewKeyframe StereoTracker::make_keyframe(const Frame& frame) const {
-  auto observations = std::make_shared<FrameObservations>();
-  observations->camera = camera_id_;
-  observations->frame_index = frame.index;
-  observations->time = frame.time;
-  observations->features = frame.features.left;
-  observations->u_right = frame.features.u_right;
-
-  const double close = options_.close_baselines * baseline(camera_);
-  const Rigid3d world_from_cam = inverse(frame.cam_from_world);
-  std::vector<std::pair<double, std::uint32_t>> by_depth;
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    const double z = depth(frame, i);
-    if (!std::isnan(z) && !frame.landmarks[i].valid()) {
-      by_depth.emplace_back(z, static_cast<std::uint32_t>(i));
-    }
-  }
-  std::sort(by_depth.begin(), by_depth.end());
-  NewKeyframe keyframe{
-      std::move(observations), frame.cam_from_world, frame.landmarks, {}, reference_};
-  for (const auto& [z, index] : by_depth) {
-    if (z > close && static_cast<int>(keyframe.new_points.size()) >= options_.min_new_points) {
-      break;
-    }
-    const Keypoint& keypoint = frame.features.left.keypoints[index];
-    const auto point =
-        triangulate_stereo(camera_, {keypoint.x, keypoint.y, frame.features.u_right[index]});
-    keyframe.new_points.emplace_back(index, world_from_cam * *point);
-  }
-  return keyframe;
+  return make_stereo_keyframe(camera_id_, camera_, frame, reference_, close_depth(),
+                              options_.min_new_points);
 }
 
 FeatureView StereoTracker::view_of(const Frame& frame) const {
   return {camera_, frame.features.left, frame.features.u_right, frame.grid};
-}
-
-// Depth of a keypoint from its stereo match [m]; NaN without one.
-double StereoTracker::depth(const Frame& frame, std::size_t keypoint) const {
-  const Keypoint& left = frame.features.left.keypoints[keypoint];
-  const auto point =
-      triangulate_stereo(camera_, {left.x, left.y, frame.features.u_right[keypoint]});
-  return point ? point->z() : std::numeric_limits<double>::quiet_NaN();
 }
 
 int StereoTracker::share_of_features(const Frame& frame, double share) const {

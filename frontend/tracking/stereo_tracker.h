@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "backend/map/map_edit.h"
 #include "backend/map/map_snapshot.h"
 #include "frontend/matching/projection_matcher.h"
 #include "frontend/odometry/disparity_calibrator.h"
@@ -15,6 +14,7 @@
 #include "frontend/tracking/local_map.h"
 #include "frontend/tracking/relocalization.h"
 #include "frontend/tracking/track_refinement.h"
+#include "frontend/tracking/tracked_frame.h"
 
 namespace hybrid_slam {
 
@@ -43,32 +43,6 @@ struct StereoTrackerOptions {
   std::string validate() const;
 };
 
-enum class PoseSource { kNone, kInitialization, kLocalMap, kOdometer, kRelocalization };
-enum class Prediction { kNone, kOdometer, kConstantVelocity, kLastPose };
-
-const char* to_string(PoseSource source);
-const char* to_string(Prediction prediction);
-
-// What tracking says of one frame.
-struct TrackedFrame {
-  std::int64_t frame_index = 0;
-  double time = 0;  // [s]
-  PoseSource source = PoseSource::kNone;
-  Prediction prediction = Prediction::kNone;
-  Rigid3d cam_from_world;       // as known at this moment
-  KeyframeId reference;         // invalid for the frame that starts the map
-  Rigid3d cam_from_reference;   // through which the frame follows later corrections
-  double disparity_offset = 0;  // [px] found in the rectification and removed
-  int odometer_inliers = 0;
-  int last_frame_inliers = 0;
-  int inliers = 0;  // landmarks that agree with the final pose
-
-  std::optional<NewKeyframe> keyframe;  // set if the frame shall become one
-  MapEdit counts;                       // found and visible landmarks
-
-  bool tracked() const { return source != PoseSource::kNone; }
-};
-
 // Tracks stereo frames one after the other against snapshots of the map (steps 1 to 7 of the
 // paper's section on tracking). One thread at a time. It never changes the map: it says which
 // frames should become keyframes, and finds them in the next snapshot.
@@ -94,7 +68,7 @@ class StereoTracker {
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
   NewKeyframe make_keyframe(const Frame& frame) const;
   FeatureView view_of(const Frame& frame) const;
-  double depth(const Frame& frame, std::size_t keypoint) const;
+  double close_depth() const { return options_.close_baselines * baseline(camera_); }
   int share_of_features(const Frame& frame, double share) const;
   void remember(Frame frame, const TrackedFrame& result);
 

@@ -29,7 +29,4 @@ class SimulatedSource final : public FrameSource {
   SyntheticScene scene_;
 };
 
-// The left keypoints, and the right ones that match them.
-StereoFeatures stereo_features(const FrameObservations& observations);
-
 }  // namespace hybrid_slam

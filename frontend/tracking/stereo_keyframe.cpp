@@ -1,0 +1,94 @@
+#include "frontend/tracking/stereo_keyframe.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "backend/map/frame_observations.h"
+
+namespace hybrid_slam {
+namespace {
+
+// From the stereo match; none without one.
+std::optional<Eigen::Vector3d> point_in_cam(const Camera& camera, const Frame& frame,
+                                            std::size_t keypoint) {
+  const Keypoint& left = frame.features.left.keypoints[keypoint];
+  return triangulate_stereo(camera, {left.x, left.y, frame.features.u_right[keypoint]});
+}
+
+}  // namespace
+
+std::optional<StereoCoverage> stereo_coverage(const Camera& camera, const Frame& frame,
+                                              double close_depth) {
+  StereoCoverage coverage;
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const auto point = point_in_cam(camera, frame, i);
+    if (!point) {
+      continue;
+    }
+    depths.push_back(point->z());
+    if (point->z() < close_depth) {
+      ++(frame.landmarks[i].valid() ? coverage.close_tracked : coverage.close_untracked);
+    }
+  }
+  if (depths.empty()) {
+    return std::nullopt;
+  }
+  const auto middle = depths.begin() + static_cast<long>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  coverage.median_depth = *middle;
+  return coverage;
+}
+
+int count_well_founded(const MapSnapshot& map, KeyframeId id) {
+  const Keyframe* keyframe = map.find(id);
+  if (keyframe == nullptr) {
+    return 0;
+  }
+  const std::size_t min_observations = map.keyframe_count() <= 2 ? 1 : 2;
+  int count = 0;
+  for (const LandmarkId landmark : keyframe->landmarks) {
+    const Landmark* found = landmark.valid() ? map.find(landmark) : nullptr;
+    count += found != nullptr && found->observations.size() >= min_observations ? 1 : 0;
+  }
+  return count;
+}
+
+NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,
+                                 KeyframeId reference, double close_depth, int min_new_points) {
+  auto observations = std::make_shared<FrameObservations>();
+  observations->camera = camera_id;
+  observations->frame_index = frame.index;
+  observations->time = frame.time;
+  observations->features = frame.features.left;
+  observations->u_right = frame.features.u_right;
+
+  struct Candidate {
+    std::uint32_t index;
+    Eigen::Vector3d point;  // in the camera
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const auto point = point_in_cam(camera, frame, i);
+    if (point && !frame.landmarks[i].valid()) {
+      candidates.push_back({static_cast<std::uint32_t>(i), *point});
+    }
+  }
+  std::stable_sort(
+      candidates.begin(), candidates.end(),
+      [](const Candidate& a, const Candidate& b) { return a.point.z() < b.point.z(); });
+  NewKeyframe keyframe{
+      std::move(observations), frame.cam_from_world, frame.landmarks, {}, reference};
+  const Rigid3d world_from_cam = inverse(frame.cam_from_world);
+  for (const Candidate& candidate : candidates) {
+    if (candidate.point.z() > close_depth &&
+        static_cast<int>(keyframe.new_points.size()) >= min_new_points) {
+      break;
+    }
+    keyframe.new_points.emplace_back(candidate.index, world_from_cam * candidate.point);
+  }
+  return keyframe;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+
+#include "backend/map/map_edit.h"
+#include "backend/map/map_snapshot.h"
+#include "frontend/tracking/frame.h"
+
+namespace hybrid_slam {
+
+// What a stereo frame sees at depths that one pair can tell.
+struct StereoCoverage {
+  int close_tracked = 0;    // close keypoints with a landmark
+  int close_untracked = 0;  // close keypoints without
+  double median_depth = 0;  // of all keypoints with a right match [m]
+};
+
+// `close_depth` [m]: nearer points are close. None if no keypoint has a depth.
+std::optional<StereoCoverage> stereo_coverage(const Camera& camera, const Frame& frame,
+                                              double close_depth);
+
+// Landmarks of a keyframe that enough others have seen to be relied on; 0 if it has been culled.
+int count_well_founded(const MapSnapshot& map, KeyframeId keyframe);
+
+// The frame as a keyframe with its landmarks. Of the keypoints with depth and without a landmark,
+// every close one makes a new point, and at least the `min_new_points` nearest do.
+NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,
+                                 KeyframeId reference, double close_depth, int min_new_points);
+
+}  // namespace hybrid_slam

@@ -1,0 +1,286 @@
+#include "frontend/tracking/stereo_tracker.h"
+
+#include <algorithm>
+#include <set>
+
+#include <catch2/catch.hpp>
+
+#include "test/frontend/pose/pose_scene.h"
+#include "test/support/filled_map.h"
+#include "test/support/stereo_frame.h"
+
+namespace hybrid_slam {
+namespace {
+
+constexpr double kMaxDistance = 0.003;  // [m] from the true pose; the ground is 3 m away,
+constexpr double kMaxAngle = 0.001;     // [rad] and keypoints are off by about 0.15 px
+
+// A circle over a seafloor, and a map that knows it from every second frame.
+struct World {
+  explicit World(std::size_t stride = 2) {
+    SyntheticSceneOptions options;
+    options.times = 60;
+    options.landmarks = 4000;
+    options.noise = 0.05;
+    options.clutter = 50;
+    scene = make_synthetic_scene(options);
+    FillOptions fill;
+    fill.stride = stride;
+    filled = fill_map(scene, fill);
+  }
+
+  const Calibrated<RectifiedStereo>& camera() const {
+    return std::get<Calibrated<RectifiedStereo>>(scene.cameras.front());
+  }
+  StereoTracker tracker(double radius = 7) const {
+    StereoTrackerOptions options;
+    options.max_features = 800;
+    options.last_frame_radius = radius;
+    return {CameraId(0), camera(), options};
+  }
+  const MapSnapshot& map() const { return filled.map.view(); }
+  Frame frame(std::size_t index) const { return stereo_frame(scene, index); }
+
+  SyntheticScene scene;
+  FilledMap filled;
+};
+
+void check_pose(const Rigid3d& estimate, const Rigid3d& truth) {
+  CHECK(pose_scene::translation_error(estimate, truth) < kMaxDistance);
+  CHECK(pose_scene::rotation_error(estimate, truth) < kMaxAngle);
+}
+
+// Without the right image, and so without odometry.
+Frame without_right(Frame frame) {
+  std::fill(frame.features.u_right.begin(), frame.features.u_right.end(), kNoRightMatch);
+  std::fill(frame.features.right_of_left.begin(), frame.features.right_of_left.end(), -1);
+  return frame;
+}
+
+// Moves the whole map, as a correction would: the world's axes become others.
+void move_world(const Rigid3d& new_from_old, Map& map) {
+  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
+  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
+  for (const KeyframeId id : map.view().keyframe_ids()) {
+    poses.emplace_back(id, map.view().at(id).cam_from_world * inverse(new_from_old));
+  }
+  for (const LandmarkId id : map.view().landmark_ids()) {
+    points.emplace_back(id, new_from_old * map.view().at(id).point_in_world);
+  }
+  map.move(poses, points);
+}
+
+}  // namespace
+
+TEST_CASE("A frame is tracked by the map to its true pose") {
+  const World world;
+  StereoTracker tracker = world.tracker();
+  CHECK(tracker.track(world.frame(9), world.map()).source == PoseSource::kRelocalization);
+  for (std::size_t i = 10; i < 20; ++i) {
+    const TrackedFrame tracked = tracker.track(world.frame(i), world.map());
+    CHECK(tracked.source == PoseSource::kLocalMap);
+    CHECK(tracked.prediction == Prediction::kOdometer);
+    CHECK(tracked.frame_index == static_cast<std::int64_t>(i));
+    CHECK(tracked.time == Approx(0.1 * static_cast<double>(i)));
+    CHECK(tracked.odometer_inliers > 100);
+    CHECK(tracked.last_frame_inliers > 100);
+    check_pose(tracked.cam_from_world, world.scene.frames[i].cam_from_world);
+    REQUIRE(world.map().find(tracked.reference) != nullptr);
+    check_pose(tracked.cam_from_reference * world.map().cam_from_world(tracked.reference),
+               tracked.cam_from_world);
+    // Every landmark found is one that the frame shows, and it was counted as visible.
+    const std::set visible(tracked.counts.visible.begin(), tracked.counts.visible.end());
+    std::set<LandmarkId> shown;
+    for (const int landmark : world.scene.frames[i].landmark) {
+      if (landmark >= 0) shown.insert(world.filled.landmarks[static_cast<std::size_t>(landmark)]);
+    }
+    CHECK(tracked.inliers == static_cast<int>(tracked.counts.found.size()));
+    CHECK(tracked.inliers > 0.85 * static_cast<double>(shown.size()));
+    for (const LandmarkId id : tracked.counts.found) {
+      CHECK(visible.contains(id));
+      CHECK(shown.contains(id));
+    }
+  }
+}
+
+TEST_CASE("A map begins with a frame that has features enough, and depths enough") {
+  const World world;
+  const Map empty;
+  StereoTrackerOptions options;
+  const Frame frame = world.frame(0);
+  const auto with_depth =
+      std::count_if(frame.features.u_right.begin(), frame.features.u_right.end(),
+                    [](float u_right) { return !std::isnan(u_right); });
+  REQUIRE(with_depth < static_cast<long>(frame.size()));
+  options.min_initial_share = 0.5;
+  for (const auto& [enough, begins] :
+       {std::pair(with_depth, true), std::pair(with_depth + 1, false)}) {
+    options.max_features = 2 * static_cast<int>(enough);
+    StereoTracker tracker(CameraId(0), world.camera(), options);
+    const TrackedFrame tracked = tracker.track(frame, empty.view());
+    CHECK(tracked.source == (begins ? PoseSource::kInitialization : PoseSource::kNone));
+    CHECK(tracked.keyframe.has_value() == begins);
+  }
+  options.max_features = 800;
+  StereoTracker tracker(CameraId(0), world.camera(), options);
+  const TrackedFrame tracked = tracker.track(frame, empty.view());
+  REQUIRE(tracked.keyframe);
+  CHECK(tracked.cam_from_world.params == Rigid3d().params);
+  CHECK(static_cast<long>(tracked.keyframe->new_points.size()) == with_depth);  // all are close
+  CHECK_FALSE(tracked.keyframe->reference.valid());
+}
+
+TEST_CASE(
+    "Without odometry the pose is predicted from the last motion, without one from the pose") {
+  const World world;
+  StereoTracker tracker = world.tracker(40);
+  REQUIRE(tracker.track(world.frame(9), world.map()).tracked());
+  const TrackedFrame first = tracker.track(without_right(world.frame(10)), world.map());
+  CHECK(first.prediction == Prediction::kLastPose);
+  check_pose(first.cam_from_world, world.scene.frames[10].cam_from_world);
+  const TrackedFrame second = tracker.track(without_right(world.frame(11)), world.map());
+  CHECK(second.prediction == Prediction::kConstantVelocity);
+  CHECK(second.last_frame_inliers > 100);
+  check_pose(second.cam_from_world, world.scene.frames[11].cam_from_world);
+}
+
+TEST_CASE("Constant velocity predicts well enough for a narrow search") {
+  const World world;
+  StereoTracker tracker = world.tracker();  // 7 px; the motion is about 45 px
+  REQUIRE(tracker.track(world.frame(9), world.map()).tracked());
+  REQUIRE(tracker.track(world.frame(10), world.map()).source == PoseSource::kLocalMap);
+  const TrackedFrame tracked = tracker.track(without_right(world.frame(11)), world.map());
+  CHECK(tracked.prediction == Prediction::kConstantVelocity);
+  CHECK(tracked.last_frame_inliers > 100);
+  check_pose(tracked.cam_from_world, world.scene.frames[11].cam_from_world);
+}
+
+TEST_CASE("The last pose follows corrections of the map") {
+  World world;
+  StereoTracker tracker = world.tracker();
+  for (std::size_t i = 9; i < 12; ++i)
+    REQUIRE(tracker.track(world.frame(i), world.map()).tracked());
+  const Rigid3d new_from_old(
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -1, 2).normalized())),
+      {2, -1, 0.5});
+  move_world(new_from_old, world.filled.map);
+  const TrackedFrame tracked = tracker.track(world.frame(12), world.map());
+  CHECK(tracked.source == PoseSource::kLocalMap);
+  CHECK(tracked.last_frame_inliers > 100);  // the prediction was right at once
+  check_pose(tracked.cam_from_world, world.scene.frames[12].cam_from_world * inverse(new_from_old));
+}
+
+TEST_CASE("Where the map does not reach, odometry holds the track and asks for a keyframe") {
+  World world;
+  StereoTracker tracker = world.tracker();
+  REQUIRE(tracker.track(world.frame(9), world.map()).tracked());
+  REQUIRE(tracker.track(world.frame(10), world.map()).tracked());
+  MapEdit edit;
+  edit.erased_landmarks = world.map().landmark_ids();
+  world.filled.map.apply(edit);
+  const TrackedFrame tracked = tracker.track(world.frame(11), world.map());
+  CHECK(tracked.source == PoseSource::kOdometer);
+  CHECK(tracked.inliers < 30);
+  CHECK(tracked.counts.empty());
+  CHECK(pose_scene::translation_error(tracked.cam_from_world,
+                                      world.scene.frames[11].cam_from_world) < 0.02);
+  REQUIRE(tracked.keyframe);
+  CHECK(tracked.keyframe->new_points.size() > 200);
+  const TrackedFrame lost = tracker.track(without_right(world.frame(12)), world.map());
+  CHECK(lost.source == PoseSource::kNone);
+  CHECK_FALSE(lost.keyframe);
+}
+
+// Tracks from frame 1 on until a keyframe is asked for, or to `last`.
+TrackedFrame track_until_keyframe(StereoTracker& tracker, const World& world, bool allow_keyframe,
+                                  std::size_t last) {
+  TrackedFrame tracked;
+  for (std::size_t i = 1; i <= last && !tracked.keyframe; ++i) {
+    tracked = tracker.track(world.frame(i), world.map(), allow_keyframe);
+    REQUIRE(tracked.tracked());
+  }
+  return tracked;
+}
+
+TEST_CASE("A keyframe is asked for where it is needed, if allowed, and once") {
+  const World world(60);  // the map is what the first frame saw
+  StereoTracker tracker = world.tracker();
+  const TrackedFrame asking = track_until_keyframe(tracker, world, true, 12);
+  REQUIRE(asking.keyframe);
+  CHECK(asking.frame_index > 2);
+  CHECK(asking.keyframe->observations->frame_index == asking.frame_index);
+  CHECK(asking.keyframe->reference == world.filled.keyframes[0]);
+  const auto next = static_cast<std::size_t>(asking.frame_index) + 1;
+  CHECK_FALSE(tracker.track(world.frame(next), world.map()).keyframe);  // not yet in the map
+
+  StereoTracker held_back = world.tracker();
+  CHECK_FALSE(track_until_keyframe(held_back, world, false, next - 1).keyframe);
+}
+
+TEST_CASE("A new keyframe becomes the reference, and its new landmarks carry on the track") {
+  World world(60);
+  StereoTracker tracker = world.tracker();
+  const TrackedFrame made = track_until_keyframe(tracker, world, true, 12);
+  REQUIRE(made.keyframe);
+  const std::size_t before = world.map().landmark_count();
+  const KeyframeId id = world.filled.map.add_keyframe(*made.keyframe);
+  CHECK(world.map().landmark_count() == before + made.keyframe->new_points.size());
+  MapEdit older;  // nothing is left but what the keyframe made
+  for (const LandmarkId landmark : world.map().at(world.filled.keyframes[0]).landmarks) {
+    if (landmark.valid()) older.erased_landmarks.push_back(landmark);
+  }
+  world.filled.map.apply(older);
+  const auto next = static_cast<std::size_t>(made.frame_index) + 1;
+  const TrackedFrame tracked = tracker.track(world.frame(next), world.map());
+  CHECK(tracked.source == PoseSource::kLocalMap);
+  CHECK(tracked.last_frame_inliers > 50);
+  CHECK(tracked.reference == id);
+  CHECK(pose_scene::translation_error(tracked.cam_from_world,
+                                      world.scene.frames[next].cam_from_world) < 0.02);
+}
+
+TEST_CASE("After a frame without features the camera is found again, and no motion is assumed") {
+  const World world;
+  StereoTracker tracker = world.tracker(40);
+  for (std::size_t i = 9; i < 11; ++i)
+    REQUIRE(tracker.track(world.frame(i), world.map()).tracked());
+  Frame blank = make_frame(11, 1.1, {}, 640, 480);
+  blank.features.left.kind = blank.features.right.kind = DescriptorKind::kSynthetic;
+  CHECK(tracker.track(blank, world.map()).source == PoseSource::kNone);
+  const TrackedFrame found = tracker.track(world.frame(30), world.map());  // across the circle
+  CHECK(found.source == PoseSource::kRelocalization);
+  CHECK(found.prediction == Prediction::kNone);
+  check_pose(found.cam_from_world, world.scene.frames[30].cam_from_world);
+  CHECK(tracker.track(without_right(world.frame(31)), world.map()).prediction ==
+        Prediction::kLastPose);
+}
+
+TEST_CASE("An offset of all disparities is found and removed while tracking") {
+  constexpr float kOffset = 0.5F;
+  SyntheticSceneOptions options;
+  options.trajectory = SceneTrajectory::kCorridor;
+  options.times = 30;
+  options.noise = 0.05;
+  const SyntheticScene scene = make_synthetic_scene(options);
+  const FilledMap filled = fill_map(scene, {});
+  StereoTracker tracker(CameraId(0), std::get<Calibrated<RectifiedStereo>>(scene.cameras[0]), {});
+  TrackedFrame tracked;
+  for (std::size_t i = 0; i < 30; ++i) {
+    Frame frame = stereo_frame(scene, i);
+    for (float& u_right : frame.features.u_right) u_right += kOffset;
+    for (Keypoint& keypoint : frame.features.right.keypoints) keypoint.x += kOffset;
+    tracked = tracker.track(frame, filled.map.view());
+  }
+  CHECK(tracked.disparity_offset == Approx(kOffset).margin(0.02));
+  CHECK(tracked.source == PoseSource::kLocalMap);
+  check_pose(tracked.cam_from_world, scene.frames[29].cam_from_world);
+}
+
+TEST_CASE("A tracker refuses options out of range") {
+  const World world(60);
+  StereoTrackerOptions options;
+  options.local_map_radius = -1;
+  CHECK_THROWS_AS(StereoTracker(CameraId(0), world.camera(), options), std::invalid_argument);
+}
+
+}  // namespace hybrid_slam
