@@ -24,9 +24,12 @@ void on_signal(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
-// Before hours of work, not after: can the results be written?
+// Before hours of work, not after: can the results be written? Nothing is left of the trial; of an
+// older run the summary goes, so that it is there only if this one has come to its end.
 void make_output_folder(const std::string& folder) {
-  write_file(make_folder(folder) / "summary.json", "{}\n");
+  const auto summary = make_folder(folder) / "summary.json";
+  write_file(summary, "{}\n");
+  std::filesystem::remove(summary);
 }
 
 // What went wrong; the run goes on, and the older checkpoint is still there.
@@ -74,6 +77,10 @@ int run(const CommandLine& line) {
   progress.finish();
   const RunSummary summary = write_outputs(line, sequence->info(), result, elapsed.count());
   print_summary(line, result, summary);
+  if (!result.internal_errors.empty()) {
+    spdlog::critical(result.internal_errors.back());
+    return kExitInternalError;
+  }
   if (result.cancelled) {
     spdlog::warn("interrupted: results up to frame {} are saved", result.frames.read);
     return kExitInterrupted;

@@ -109,6 +109,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   json["disparity_offset_px"] =
       result.records.empty() ? 0 : result.records.back().frame.disparity_offset;
   json["interrupted"] = result.cancelled;
+  json["internal_errors"] = result.internal_errors;
   json["seconds"] = summary.seconds;
   json["ate"] = summary.ate ? to_json(*summary.ate) : Json();
   json["truth_convention"] =

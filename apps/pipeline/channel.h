@@ -10,40 +10,56 @@
 
 namespace hybrid_slam {
 
+// What lets threads wait for one another until it is closed: the base of the two below.
+// Thread-safe.
+class Closable {
+ public:
+  // Ends all waiting, for good. The flag is set under the lock, so that no waiter can miss it.
+  void close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
+
+ protected:
+  Closable() = default;
+  ~Closable() = default;
+
+  // Waits until `condition` holds or all is closed. Returns with the lock held.
+  template <typename Condition>
+  std::unique_lock<std::mutex> wait_for(const Condition& condition) const {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || condition(); });
+    return lock;
+  }
+
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  bool closed_ = false;  // guarded by mutex_
+};
+
 // A bounded queue between two stages. Thread-safe. Shutting down is closing: what is queued is
-// still delivered, then pop() comes back empty.
+// still delivered, then pop() comes back empty; no push succeeds any more.
 template <typename T>
-class Channel {
+class Channel : public Closable {
  public:
   explicit Channel(std::size_t capacity) : capacity_(capacity) {}
 
   // Waits while the channel is full. False, and the value is dropped, once it is closed.
   bool push(T value) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return closed_ || queue_.size() < capacity_; });
-    if (closed_) {
-      return false;
-    }
-    queue_.push_back(std::move(value));
-    changed_.notify_all();
-    return true;
+    const auto lock = wait_for([this] { return queue_.size() < capacity_; });
+    return append(std::move(value));
   }
 
   // Never waits: false if there is no room, or the channel is closed.
   bool try_push(T value) {
     const std::lock_guard lock(mutex_);
-    if (closed_ || queue_.size() >= capacity_) {
-      return false;
-    }
-    queue_.push_back(std::move(value));
-    changed_.notify_all();
-    return true;
+    return append(std::move(value));
   }
 
   // Waits for a value. Empty once the channel is closed and drained.
   std::optional<T> pop() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return closed_ || !queue_.empty(); });
+    const auto lock = wait_for([this] { return !queue_.empty(); });
     if (queue_.empty()) {
       return std::nullopt;
     }
@@ -54,9 +70,8 @@ class Channel {
   }
 
   // Waits until nothing is queued, or the channel is closed.
-  void wait_empty() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return closed_ || queue_.empty(); });
+  void wait_empty() const {
+    wait_for([this] { return queue_.empty(); });
   }
 
   std::size_t size() const {
@@ -64,25 +79,25 @@ class Channel {
     return queue_.size();
   }
 
-  // No push succeeds any more. The flag is set under the lock, so that no waiter can miss it.
-  void close() {
-    const std::lock_guard lock(mutex_);
-    closed_ = true;
+ private:
+  // With the lock held.
+  bool append(T&& value) {
+    if (closed_ || queue_.size() >= capacity_) {
+      return false;
+    }
+    queue_.push_back(std::move(value));
     changed_.notify_all();
+    return true;
   }
 
- private:
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
   std::deque<T> queue_;  // guarded by mutex_
-  bool closed_ = false;  // guarded by mutex_
 };
 
 // The newest value of something that is published again and again; readers keep what they took.
 // Thread-safe.
 template <typename T>
-class Latest {
+class Latest : public Closable {
  public:
   void publish(std::shared_ptr<const T> value) {
     const std::lock_guard lock(mutex_);
@@ -97,10 +112,15 @@ class Latest {
     return value_;
   }
 
-  // Waits for a publication after version `seen` (see version()), or close().
-  void wait_beyond(std::size_t seen) const {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || version_ > seen; });
+  // Waits for a publication after version `seen` (0: for any), which becomes that of the value
+  // returned. Null once it is closed.
+  std::shared_ptr<const T> next(std::size_t& seen) const {
+    const auto lock = wait_for([&] { return version_ > seen; });
+    if (closed_) {
+      return nullptr;
+    }
+    seen = version_;
+    return value_;
   }
 
   std::size_t version() const {
@@ -108,18 +128,9 @@ class Latest {
     return version_;
   }
 
-  void close() {
-    const std::lock_guard lock(mutex_);
-    closed_ = true;
-    changed_.notify_all();
-  }
-
  private:
-  mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
   std::shared_ptr<const T> value_;  // guarded by mutex_
   std::size_t version_ = 0;         // guarded by mutex_
-  bool closed_ = false;             // guarded by mutex_
 };
 
 }  // namespace hybrid_slam

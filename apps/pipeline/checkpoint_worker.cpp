@@ -1,59 +1,52 @@
 #include "apps/pipeline/checkpoint_worker.h"
 
+#include <exception>
 #include <utility>
 
 namespace hybrid_slam {
 
-CheckpointWorker::CheckpointWorker(std::function<std::string(const MapSnapshot&)> save, int every)
-    : save_(std::move(save)),
-      every_(every),
-      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+std::optional<RunFailure> save_checkpoint(const SaveMap& save, const MapSnapshot& map,
+                                          StageTimes& times) {
+  StageClock clock(times);
+  RunFailure failure;
+  try {
+    failure.text = save(map);
+  } catch (const std::exception& error) {
+    failure = {std::string("internal error while saving a checkpoint: ") + error.what(), true};
+  }
+  clock.lap("checkpoint");
+  return failure.text.empty() ? std::nullopt : std::optional(std::move(failure));
+}
+
+CheckpointWorker::CheckpointWorker(SaveMap save, int every)
+    : save_(std::move(save)), schedule_(every), thread_([this] { work(); }) {}
 
 void CheckpointWorker::keyframe_added(std::shared_ptr<const MapSnapshot> map) {
-  ++keyframes_;
-  if (every_ > 0 && keyframes_ % every_ == 0) {
+  if (schedule_.due()) {
     maps_.publish(std::move(map));
   }
 }
 
-std::vector<std::string> CheckpointWorker::take_failures() {
+std::vector<RunFailure> CheckpointWorker::take_failures() {
   const std::lock_guard lock(mutex_);
   return std::exchange(failures_, {});
 }
 
 void CheckpointWorker::finish() {
-  thread_.request_stop();
   maps_.close();
   if (thread_.joinable()) {
     thread_.join();
   }
 }
 
-void CheckpointWorker::rethrow() const {
-  if (thrown_) {
-    std::rethrow_exception(thrown_);
-  }
-}
-
-void CheckpointWorker::work(const std::stop_token& stop) {
+void CheckpointWorker::work() {
   std::size_t seen = 0;
-  try {
-    for (;;) {
-      maps_.wait_beyond(seen);
-      if (stop.stop_requested()) {
-        return;
-      }
-      seen = maps_.version();
-      StageClock clock(times_);
-      const std::string failure = save_(*maps_.get());
-      clock.lap("checkpoint");
-      if (!failure.empty()) {
-        const std::lock_guard lock(mutex_);
-        failures_.push_back(failure);
-      }
+  while (const auto map = maps_.next(seen)) {
+    auto failure = save_checkpoint(save_, *map, times_);
+    if (failure) {
+      const std::lock_guard lock(mutex_);
+      failures_.push_back(std::move(*failure));
     }
-  } catch (...) {
-    thrown_ = std::current_exception();
   }
 }
 

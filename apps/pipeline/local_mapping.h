@@ -16,6 +16,8 @@ namespace hybrid_slam {
 struct MappingJob {
   NewKeyframe keyframe;
   MapEdit counts;
+
+  std::int64_t frame_index() const { return keyframe.observations->frame_index; }
 };
 
 // Adds the counts of one frame to those that wait for the next keyframe.

@@ -95,4 +95,10 @@ std::optional<LoadedFrame> OrderedLoader::next() {
   return loaded;
 }
 
+OrderedLoader::NextIndex indices_below(std::size_t count) {
+  return [next = std::size_t{0}, count]() mutable {
+    return next < count ? std::optional(next++) : std::nullopt;
+  };
+}
+
 }  // namespace hybrid_slam

@@ -65,4 +65,7 @@ class OrderedLoader {
   std::vector<std::jthread> threads_;  // last: joined before the rest goes
 };
 
+// All indices from 0 on, `count` of them.
+OrderedLoader::NextIndex indices_below(std::size_t count);
+
 }  // namespace hybrid_slam

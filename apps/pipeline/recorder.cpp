@@ -12,15 +12,23 @@ Rigid3d RunResult::cam_from_world(const FrameRecord& record) const {
 void Recorder::corrupt(const std::string& reason) {
   ++result_.frames.read;
   ++result_.frames.corrupt;
-  warn({reason});
+  warn(reason);
   report();
 }
 
-void Recorder::warn(const std::vector<std::string>& texts) {
-  for (const std::string& text : texts) {
-    if (hooks_.warning) {
-      hooks_.warning(text);
-    }
+void Recorder::failed(const std::optional<RunFailure>& failure) {
+  if (!failure) {
+    return;
+  }
+  warn(failure->text);
+  if (failure->internal) {
+    result_.internal_errors.push_back(failure->text);
+  }
+}
+
+void Recorder::warn(const std::string& text) {
+  if (hooks_.warning) {
+    hooks_.warning(text);
   }
 }
 

@@ -16,13 +16,14 @@ class Recorder {
   }
 
   void corrupt(const std::string& reason);
-  void warn(const std::vector<std::string>& texts);
+  void failed(const std::optional<RunFailure>& failure);  // nothing to do if none
   void dropped(int count) { result_.frames.dropped += count; }
   void tracked(const TrackedFrame& frame, const MapSnapshot& map);
   void became_keyframe(std::int64_t frame_index, KeyframeId id);
-  bool cancelled();
+  bool cancelled();  // asked for? Then the result says so
 
  private:
+  void warn(const std::string& text);
   void report();
 
   RunResult& result_;

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "apps/io/stage_times.h"
@@ -21,6 +22,11 @@ struct RunOptions {
   // Realtime: images per second, dropped when the pipeline is behind; 0: they wait for it.
   double rate = 0;
   int checkpoint_every = 0;  // keyframes: so often the map is saved on the way; 0: never
+
+  // How many frames are processed of those that there are.
+  std::size_t frames_of(std::size_t available) const {
+    return limit > 0 ? std::min(limit, available) : available;
+  }
 };
 
 struct FrameCounts {
@@ -45,16 +51,25 @@ struct RunProgress {
   std::size_t landmarks = 0;
 };
 
+// Something went wrong and the run goes on.
+struct RunFailure {
+  std::string text;       // one line
+  bool internal = false;  // a bug of ours
+};
+
+// Saves a map and returns what went wrong, empty if nothing did.
+using SaveMap = std::function<std::string(const MapSnapshot&)>;
+
 // What a run needs from outside. `cancelled` may be set at any moment, from a signal handler too:
 // the run then ends in order, with what it has.
 struct RunHooks {
   std::function<void(const RunProgress&)> progress;  // after each frame, in the calling thread
   std::function<void(const std::string&)> warning;   // one line each
   const std::atomic<bool>* cancelled = nullptr;
-  // Saves the map so far and returns what went wrong, empty if nothing did: that is a warning and
+  // Saves the map so far. What goes wrong is a warning, what it throws an internal error as well;
   // the run goes on. Every-frame: in the calling thread; realtime: in another, one call at a time,
   // and maps that come meanwhile are left out but for the last.
-  std::function<std::string(const MapSnapshot&)> checkpoint;
+  SaveMap checkpoint;
 };
 
 struct RunResult {
@@ -63,6 +78,7 @@ struct RunResult {
   std::shared_ptr<const MapSnapshot> map;
   StageTimes times;
   bool cancelled = false;
+  std::vector<std::string> internal_errors;  // that did not end the run; each was a warning, too
 
   // Final pose of a tracked frame, through its reference keyframe.
   Rigid3d cam_from_world(const FrameRecord& record) const;

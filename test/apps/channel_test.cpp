@@ -1,7 +1,9 @@
 #include "apps/pipeline/channel.h"
 
 #include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <numeric>
 #include <thread>
 #include <vector>
@@ -67,26 +69,50 @@ TEST_CASE("Closing wakes whoever waits", "[pipeline]") {
   CHECK_FALSE(popped);
 }
 
+TEST_CASE("Whoever waits until a channel is empty goes on when the last value is taken",
+          "[pipeline]") {
+  Channel<int> channel(2);
+  CHECK(channel.push(1));
+  CHECK(channel.push(2));
+  std::atomic<bool> empty = false;
+  {
+    const std::jthread waiter([&] {
+      channel.wait_empty();
+      empty = true;
+    });
+    CHECK(channel.pop() == 1);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    CHECK_FALSE(empty);
+    CHECK(channel.pop() == 2);
+  }
+  CHECK(empty);
+}
+
 TEST_CASE("Latest hands out the newest value and wakes those who wait for one", "[pipeline]") {
   Latest<int> latest;
   CHECK(latest.get() == nullptr);
+  CHECK(latest.version() == 0);
   latest.publish(std::make_shared<const int>(1));
   const auto old = latest.get();
-  const std::size_t seen = latest.version();
-  int after = 0;
+  std::size_t seen = 0;
+  CHECK(latest.next(seen) == old);  // published already: no need to wait
+  CHECK(seen == latest.version());
+  std::shared_ptr<const int> after;
   {
-    const std::jthread reader([&] {
-      latest.wait_beyond(seen);
-      after = *latest.get();
-    });
+    const std::jthread reader([&] { after = latest.next(seen); });
     latest.publish(std::make_shared<const int>(2));
   }
-  CHECK(after == 2);
+  REQUIRE(after);
+  CHECK(*after == 2);
   CHECK(*old == 1);
+  CHECK(seen == latest.version());
+  after = old;
   {
-    const std::jthread reader([&] { latest.wait_beyond(latest.version() + 1); });
+    const std::jthread reader([&] { after = latest.next(seen); });
     latest.close();
   }
+  CHECK(after == nullptr);
+  CHECK(*latest.get() == 2);
 }
 
 }  // namespace

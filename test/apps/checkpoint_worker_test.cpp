@@ -30,11 +30,13 @@ TEST_CASE("Of the maps that come while one is saved, the last one follows", "[pi
   for (std::size_t i = 3; i <= 9; ++i) worker.keyframe_added(map_of(i));  // waits for nobody
   answers.push("disk full");
   CHECK(begun.pop() == 8U);
-  CHECK(worker.take_failures() == std::vector<std::string>{"disk full"});
+  const auto failures = worker.take_failures();
+  REQUIRE(failures.size() == 1);
+  CHECK(failures[0].text == "disk full");
+  CHECK_FALSE(failures[0].internal);
   CHECK(worker.take_failures().empty());
   answers.push("");
   worker.finish();
-  worker.rethrow();
   CHECK(begun.size() == 0);
   CHECK(worker.take_failures().empty());
   REQUIRE(worker.times().stages().size() == 1);
@@ -48,18 +50,35 @@ TEST_CASE("Without an interval nothing is saved", "[pipeline]") {
   CHECK(worker.take_failures().empty());
 }
 
-TEST_CASE("What saving throws comes out in the end", "[pipeline]") {
-  Channel<int> begun(1);
+TEST_CASE("What saving throws is told at once, as a bug of ours, and saving goes on",
+          "[pipeline]") {
+  Channel<std::size_t> begun(1);
   CheckpointWorker worker(
-      [&](const MapSnapshot&) -> std::string {
-        begun.push(1);
-        throw std::logic_error("a bug");
+      [&](const MapSnapshot& map) -> std::string {
+        begun.push(map.camera_count());
+        if (map.camera_count() == 1) throw std::logic_error("a bug");
+        return {};
       },
       1);
-  worker.keyframe_added(map_of(0));
-  CHECK(begun.pop() == 1);
+  worker.keyframe_added(map_of(1));
+  CHECK(begun.pop() == 1U);
+  std::vector<RunFailure> failures;
+  while (failures.empty()) failures = worker.take_failures();  // before finish()
+  CHECK(failures[0].text == "internal error while saving a checkpoint: a bug");
+  CHECK(failures[0].internal);
+  worker.keyframe_added(map_of(2));
+  CHECK(begun.pop() == 2U);
   worker.finish();
-  CHECK_THROWS_WITH(worker.rethrow(), "a bug");
+  CHECK(worker.take_failures().empty());
+}
+
+TEST_CASE("Every so many keyframes a checkpoint is due", "[pipeline]") {
+  CheckpointSchedule every_third(3);
+  CheckpointSchedule never(0);
+  for (int keyframe = 1; keyframe <= 10; ++keyframe) {
+    CHECK(every_third.due() == (keyframe % 3 == 0));
+    CHECK_FALSE(never.due());
+  }
 }
 
 }  // namespace

@@ -73,6 +73,7 @@ TEST_CASE("a killed run leaves its last checkpoint") {
     const LoadedMap loaded = load_map(out / "map.hslam");
     CHECK(loaded.map.view().keyframe_count() >= 1);
     CHECK_FALSE(fs::exists(out / "stereo.tum"));
+    CHECK_FALSE(fs::exists(out / "summary.json"));
   }
 }
 
@@ -103,6 +104,7 @@ TEST_CASE("a full disk ends in one line and code 3") {
   const std::string command = "trap '' XFSZ; ulimit -f 100; exec " HYBRID_SLAM " data --quiet";
   const Outcome outcome = run_program("/bin/sh", {"-c", command}, folder.path());
   check_refused(outcome, 3, "cannot be written: File too large");
+  CHECK_FALSE(fs::exists(folder.path() / "out/summary.json"));
 }
 
 }  // namespace

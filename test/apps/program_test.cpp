@@ -73,6 +73,7 @@ TEST_CASE("hybrid_slam tracks a survey and writes what it documents") {
   CHECK(summary["keyframes"].get<int>() >= 2);
   CHECK(summary["landmarks"].get<int>() >= 200);
   CHECK(summary["interrupted"] == false);
+  CHECK(summary["internal_errors"] == Json::array());
   CHECK(summary["seed"] == 7);
   CHECK(summary["options"]["features"] == 400);
   CHECK(summary["options"]["mode"] == "every-frame");

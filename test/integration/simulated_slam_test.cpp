@@ -1,7 +1,10 @@
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
+#include <thread>
 
 #include "apps/pipeline/slam_run.h"
 #include "test/integration/simulated_source.h"
@@ -173,6 +176,54 @@ TEST_CASE("A run can be cancelled at any frame and keeps what it has", "[integra
       CHECK(result.frames.read == after);
       CHECK(result.frames.tracked == after);
     }
+  }
+}
+
+TEST_CASE("A run that waits for a slow camera ends at once when it is cancelled", "[integration]") {
+  const SimulatedSource source(make_synthetic_scene(orbit(60)));
+  std::atomic<bool> cancelled = false;
+  std::atomic<int> done = 0;
+  RunHooks hooks;
+  hooks.cancelled = &cancelled;
+  hooks.progress = [&](const RunProgress&) { ++done; };
+  RunOptions run;
+  run.rate = 0.001;  // the second image is due in a quarter of an hour
+  const auto start = std::chrono::steady_clock::now();
+  const std::jthread canceller([&] {
+    while (done == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    cancelled = true;
+  });
+  const RunResult result = run_realtime(source, slam_options(), run, hooks);
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(20));
+  CHECK(result.cancelled);
+  CHECK(result.frames.read == 1);
+  CHECK(result.frames.tracked == 1);
+}
+
+TEST_CASE("A checkpoint that fails by a bug is told when it happens, and the run goes on",
+          "[integration]") {
+  const SimulatedSource source(make_synthetic_scene(orbit(40)));
+  RunOptions run;
+  run.checkpoint_every = 2;
+  for (const bool realtime : {false, true}) {
+    std::size_t told_at = 0;  // frame
+    std::size_t done = 0;
+    std::vector<std::string> warnings;
+    RunHooks hooks;
+    hooks.progress = [&](const RunProgress& progress) { done = progress.done; };
+    hooks.warning = [&](const std::string& text) {
+      warnings.push_back(text);
+      if (told_at == 0) told_at = done;
+    };
+    hooks.checkpoint = [](const MapSnapshot&) -> std::string { throw std::logic_error("a bug"); };
+    const RunResult result = realtime ? run_realtime(source, slam_options(), run, hooks)
+                                      : run_every_frame(source, slam_options(), run, hooks);
+    CHECK(result.frames.tracked == 40);
+    REQUIRE_FALSE(warnings.empty());
+    CHECK(warnings[0] == "internal error while saving a checkpoint: a bug");
+    CHECK(result.internal_errors == warnings);
+    CHECK(told_at < 40);
   }
 }
 
