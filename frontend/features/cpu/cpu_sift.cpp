@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "frontend/features/cpu/patch_kernels.h"
 #include "frontend/features/feature_selection.h"
@@ -57,41 +58,63 @@ std::vector<sift::Extremum> CpuSift::select() const {
   std::vector<Keypoint> keypoints;
   keypoints.reserve(extrema_.size());
   for (const sift::Extremum& extremum : extrema_) keypoints.push_back(keypoint_of(extremum));
+  std::vector<int> kept = select_spread(keypoints, width_, height_, options_.max_features);
+  std::sort(kept.begin(), kept.end());
   std::vector<sift::Extremum> selected;
-  for (const int i : select_spread(keypoints, width_, height_, options_.max_features)) {
-    selected.push_back(extrema_[static_cast<std::size_t>(i)]);
-  }
+  selected.reserve(kept.size());
+  for (const int i : kept) selected.push_back(extrema_[static_cast<std::size_t>(i)]);
   return selected;
 }
 
 CpuSift::Oriented CpuSift::orient(const std::vector<sift::Extremum>& extrema) const {
-  Oriented all;
-  for (const sift::Extremum& extremum : extrema) {
+  std::vector<Keypoint> keypoints;
+  std::vector<std::size_t> extremum_of;
+  for (std::size_t i = 0; i < extrema.size(); ++i) {
+    if (i + 1 < extrema.size()) prefetch(extrema[i + 1], sift::kOrientationReach);
     float angles[sift::kMaxOrientations];
-    const sift::LevelView level = scale_space_.level(extremum.octave, extremum.level);
-    const int count = sift::find_angles(level, place_in_level(extremum), angles);
-    for (int i = 0; i < count; ++i) {
-      all.keypoints.push_back(keypoint_of(extremum));
-      all.keypoints.back().angle = angles[i];
-      all.extrema.push_back(&extremum);
+    const int count = sift::find_angles(level_of(extrema[i]), place_in_level(extrema[i]), angles);
+    for (int k = 0; k < count; ++k) {
+      keypoints.push_back(keypoint_of(extrema[i]));
+      keypoints.back().angle = angles[k];
+      extremum_of.push_back(i);
     }
   }
-  Oriented kept;
-  for (const int i : select_spread(all.keypoints, width_, height_, options_.max_features)) {
-    kept.keypoints.push_back(all.keypoints[static_cast<std::size_t>(i)]);
-    kept.extrema.push_back(all.extrema[static_cast<std::size_t>(i)]);
+  const std::vector<int> kept = select_spread(keypoints, width_, height_, options_.max_features);
+  Oriented oriented;
+  for (const int i : kept) {
+    const auto index = static_cast<std::size_t>(i);
+    oriented.keypoints.push_back(keypoints[index]);
+    oriented.extrema.push_back(extrema[extremum_of[index]]);
   }
-  return kept;
+  oriented.by_place.resize(kept.size());
+  std::iota(oriented.by_place.begin(), oriented.by_place.end(), 0);
+  std::sort(oriented.by_place.begin(), oriented.by_place.end(), [&](int a, int b) {
+    return kept[static_cast<std::size_t>(a)] < kept[static_cast<std::size_t>(b)];
+  });
+  return oriented;
 }
 
 std::vector<Descriptor> CpuSift::describe(const Oriented& features) const {
   std::vector<Descriptor> descriptors(features.keypoints.size());
-  for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    const sift::Extremum& extremum = *features.extrema[i];
-    sift::describe(scale_space_.level(extremum.octave, extremum.level), place_in_level(extremum),
-                   features.keypoints[i].angle, descriptors[i].data());
+  const auto at = [&](std::size_t k) { return static_cast<std::size_t>(features.by_place[k]); };
+  for (std::size_t k = 0; k < descriptors.size(); ++k) {
+    if (k + 1 < descriptors.size()) {
+      prefetch(features.extrema[at(k + 1)], sift::kDescriptorReach);
+    }
+    const sift::Extremum& extremum = features.extrema[at(k)];
+    sift::describe(level_of(extremum), place_in_level(extremum), features.keypoints[at(k)].angle,
+                   descriptors[at(k)].data());
   }
   return descriptors;
+}
+
+// What the next patch needs comes into the cache while this one is worked on.
+void CpuSift::prefetch(const sift::Extremum& extremum, float reach) const {
+  sift::prefetch_patch(level_of(extremum), place_in_level(extremum), reach);
+}
+
+sift::LevelView CpuSift::level_of(const sift::Extremum& extremum) const {
+  return scale_space_.level(extremum.octave, extremum.level);
 }
 
 std::unique_ptr<SiftExtractor> make_sift(const SiftOptions& options) {

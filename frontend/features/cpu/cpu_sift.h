@@ -20,13 +20,14 @@ class CpuSift final : public SiftExtractor {
   // All extrema outside of the mask.
   const std::vector<sift::Extremum>& detect(const GrayImage& image, const GrayImage* mask);
 
-  // Of the extrema last detected, those that select_spread() keeps.
+  // Of the extrema last detected, those that select_spread() keeps, by place.
   std::vector<sift::Extremum> select() const;
 
   // A feature for each angle of each extremum; of these, those that select_spread() keeps.
   struct Oriented {
     std::vector<Keypoint> keypoints;
-    std::vector<const sift::Extremum*> extrema;  // keypoints[i] belongs to *extrema[i]
+    std::vector<sift::Extremum> extrema;  // keypoints[i] lies at extrema[i]
+    std::vector<int> by_place;            // the indices of both, in the order of `extrema` given
   };
   Oriented orient(const std::vector<sift::Extremum>& extrema) const;
 
@@ -34,6 +35,8 @@ class CpuSift final : public SiftExtractor {
 
  private:
   Keypoint keypoint_of(const sift::Extremum& extremum) const;
+  sift::LevelView level_of(const sift::Extremum& extremum) const;
+  void prefetch(const sift::Extremum& extremum, float reach) const;
 
   SiftOptions options_;
   sift::ScaleSpace scale_space_;

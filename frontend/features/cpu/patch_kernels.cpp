@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include <hwy/cache_control.h>
+
 #include "frontend/features/cpu/patch_tables.h"
 #include "frontend/features/definition/descriptor.h"
 #include "frontend/features/definition/orientation.h"
@@ -233,6 +235,21 @@ namespace hybrid_slam::sift {
 
 HWY_EXPORT(angles_of);
 HWY_EXPORT(descriptor_of);
+
+void prefetch_patch(const LevelView& level, const PlaceInLevel& place, float reach) {
+  constexpr int kCacheLine = 64 / sizeof(float);
+  const int steps = static_cast<int>(reach * place.scale) + 1;
+  const int x = static_cast<int>(place.x);
+  const int y = static_cast<int>(place.y);
+  const int last = std::min(x + steps, level.width - 1);
+  for (int row = std::max(y - steps, 0); row <= std::min(y + steps, level.height - 1); ++row) {
+    const float* samples = level.samples + row * level.stride;
+    for (int column = std::max(x - steps, 0); column < last; column += kCacheLine) {
+      hwy::Prefetch(samples + column);
+    }
+    hwy::Prefetch(samples + last);
+  }
+}
 
 int find_angles(const LevelView& level, const PlaceInLevel& place, float* angles) {
   return HWY_DYNAMIC_DISPATCH(angles_of)(level, place, angles);

@@ -14,6 +14,14 @@ struct PlaceInLevel {
   float x, y, scale;
 };
 
+// How far from a feature its patches reach [scales]: half a side, and half a diagonal.
+constexpr float kOrientationReach = kOrientationStep * (kOrientationRadius + 1);
+constexpr float kDescriptorReach =
+    1.415F * 0.5F * kCellSize * (kCells + 1 + 1.0F / kSamplesPerCell);
+
+// Asks for the samples that the feature's patch of this reach [scales] will need.
+void prefetch_patch(const LevelView& level, const PlaceInLevel& place, float reach);
+
 // Writes the feature's angles, ascending from 0, to `angles`, which has room for kMaxOrientations,
 // and returns how many there are. None where there is no gradient.
 int find_angles(const LevelView& level, const PlaceInLevel& place, float* angles);

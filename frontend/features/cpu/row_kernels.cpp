@@ -93,6 +93,54 @@ void sum_rows_and_subtract(const float* const* rows, std::size_t count, const fl
   });
 }
 
+// Two vectors of each of the four sums, of which those from `First` to `Last` have a weight for the
+// row.
+struct Block {
+  Sums left, right;
+};
+
+template <int First, int Last>
+HWY_INLINE void add_to_block(const float* row, const float* weight, Block& b) {
+  const Floats d;
+  const Vector left = hn::LoadU(d, row);
+  const Vector right = hn::LoadU(d, row + hn::Lanes(d));
+  const auto add = [&](const float* of, Vector& to_left, Vector& to_right) HWY_ATTR {
+    const Vector w = hn::Set(d, *of);
+    to_left = hn::MulAdd(w, left, to_left);
+    to_right = hn::MulAdd(w, right, to_right);
+  };
+  if constexpr (First <= 0 && 0 <= Last) add(weight, b.left.v0, b.right.v0);
+  if constexpr (First <= 1 && 1 <= Last) add(weight - 1, b.left.v1, b.right.v1);
+  if constexpr (First <= 2 && 2 <= Last) add(weight - 2, b.left.v2, b.right.v2);
+  if constexpr (First <= 3 && 3 <= Last) add(weight - 3, b.left.v3, b.right.v3);
+}
+
+void sum_block(const float* const* HWY_RESTRICT rows, std::size_t count,
+               const float* HWY_RESTRICT weights, std::size_t width, float* const* out) {
+  static_assert(kBlockRows == 4);
+  const Floats d;
+  const std::size_t lanes = hn::Lanes(d);
+  for (std::size_t x = 0; x < width; x += 2 * lanes) {
+    const Vector zero = hn::Zero(d);
+    Block b{{zero, zero, zero, zero}, {zero, zero, zero, zero}};
+    add_to_block<0, 0>(rows[0] + x, weights, b);
+    add_to_block<0, 1>(rows[1] + x, weights + 1, b);
+    add_to_block<0, 2>(rows[2] + x, weights + 2, b);
+    for (std::size_t i = 3; i < count; ++i) add_to_block<0, 3>(rows[i] + x, weights + i, b);
+    add_to_block<1, 3>(rows[count] + x, weights + count, b);
+    add_to_block<2, 3>(rows[count + 1] + x, weights + count + 1, b);
+    add_to_block<3, 3>(rows[count + 2] + x, weights + count + 2, b);
+    const auto store = [&](Vector left, Vector right, float* to) HWY_ATTR {
+      hn::StoreU(left, d, to + x);
+      if (x + lanes < width) hn::StoreU(right, d, to + x + lanes);
+    };
+    store(b.left.v0, b.right.v0, out[0]);
+    store(b.left.v1, b.right.v1, out[1]);
+    store(b.left.v2, b.right.v2, out[2]);
+    store(b.left.v3, b.right.v3, out[3]);
+  }
+}
+
 void bytes_to_floats(const std::uint8_t* HWY_RESTRICT in, std::size_t width,
                      float* HWY_RESTRICT out) {
   const Floats d;
@@ -192,6 +240,7 @@ namespace hybrid_slam::sift {
 
 HWY_EXPORT(sum_rows);
 HWY_EXPORT(sum_rows_and_subtract);
+HWY_EXPORT(sum_block);
 HWY_EXPORT(bytes_to_floats);
 HWY_EXPORT(interleave_rows);
 HWY_EXPORT(extrema_of_row);
@@ -206,6 +255,11 @@ void symmetric_sum_and_difference(const float* const* rows, std::size_t count, c
                                   float* difference) {
   HWY_DYNAMIC_DISPATCH(sum_rows_and_subtract)
   (rows, count, weights, width, out, below, difference);
+}
+
+void sum_columns(const float* const* rows, std::size_t count, const float* weights,
+                 std::size_t width, float* const* out) {
+  HWY_DYNAMIC_DISPATCH(sum_block)(rows, count, weights, width, out);
 }
 
 void to_floats(const std::uint8_t* in, std::size_t width, float* out) {

@@ -17,7 +17,15 @@ constexpr std::size_t kRowPadding = 16;
 void symmetric_sum(const float* const* rows, std::size_t count, const float* weights,
                    std::size_t width, float* out);
 
-// The same, and difference[x] = out[x] - below[x].
+// Rows that are blurred along their columns at once, so that each row is read once for all of them.
+constexpr std::size_t kBlockRows = 4;
+
+// For j = 0 .. kBlockRows - 1: out[j][x] = sum over i of weights[i] * rows[j + i][x]. There are
+// count + kBlockRows - 1 rows, none of which is written to.
+void sum_columns(const float* const* rows, std::size_t count, const float* weights,
+                 std::size_t width, float* const* out);
+
+// As symmetric_sum(), and difference[x] = out[x] - below[x].
 void symmetric_sum_and_difference(const float* const* rows, std::size_t count, const float* weights,
                                   std::size_t width, float* out, const float* below,
                                   float* difference);

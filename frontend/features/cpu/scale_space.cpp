@@ -10,6 +10,14 @@ namespace {
 // Rows above and below an extremum that its refinement may read.
 constexpr int kSearchReach = kMaxMoves + 1;
 
+constexpr int kBlock = kBlockRows;
+
+int whole_blocks(int rows) { return (rows + kBlock - 1) / kBlock * kBlock; }
+
+void halve(const float* row, int half_width, float* out) {
+  for (int x = 0; x < half_width; ++x) out[x] = row[2 * x];
+}
+
 auto place(const RefinedExtremum& e) { return std::tuple(e.layer, e.y, e.x); }
 
 }  // namespace
@@ -23,26 +31,32 @@ ScaleSpace::ScaleSpace(const SiftOptions& options)
   lags_.push_back(0);
   for (int level = 1; level < layers_ + 3; ++level) {
     kernels_.emplace_back(level_step_sigma(initial_sigma_, layers_, level), KernelCentre::kSample);
-    lags_.push_back(lags_.back() + kernels_.back().reach());
+    lags_.push_back(lags_.back() + whole_blocks(kernels_.back().reach()));
   }
-  pointers_.resize(kernels_.back().weights.size());
+  search_lag_ = lags_.back() + whole_blocks(kSearchReach);
+  pointers_.resize(kernels_.back().weights.size() + kBlockRows - 1);
 }
 
 ScaleSpace::Octave ScaleSpace::make_octave(int index) const {
   const int width = octave_size(width_, index);
   const int height = octave_size(height_, index);
-  Octave octave{index, width, height, {}, {}, PaddedRow(width, kernels_.back().reach())};
+  Octave octave{index, width, height, {}, {}, {}};
   const int levels = layers_ + 3;
-  for (int level = 0; level < levels; ++level) {
-    const bool from_image = level == 0 && index == (upsample_ ? -1 : 0);
-    const bool whole = level == 0 ? !from_image : level <= layers_;
-    const int read = level + 1 < levels ? kernels_[static_cast<std::size_t>(level)].size() : 1;
-    octave.levels.emplace_back(width, whole ? height : std::min(read, height));
+  for (int k = 0; k < levels; ++k) {
+    const bool from_image = k == 0 && index == (upsample_ ? -1 : 0);
+    int rows = kBlock;
+    if (k + 1 < levels) {
+      const auto above = static_cast<std::size_t>(k + 1);
+      rows += lags_[above] - lags_[above - 1] + kernels_[above - 1].reach();
+    }
+    const bool whole = k == 0 ? !from_image : k <= layers_;
+    octave.levels.emplace_back(width, whole ? height : std::min(rows, height));
   }
-  for (std::size_t k = 0; k + 1 < octave.levels.size(); ++k) {
-    const int waiting = lags_.back() - lags_[k + 1];
-    octave.differences.emplace_back(width, std::min(waiting + 2 * kSearchReach + 1, height));
+  for (std::size_t k = 1; k < octave.levels.size(); ++k) {
+    const int rows = search_lag_ - lags_[k] + kSearchReach + kBlock;
+    octave.differences.emplace_back(width, std::min(rows, height));
   }
+  for (int i = 0; i < kBlock; ++i) octave.blurred.emplace_back(width, kernels_.back().reach());
   return octave;
 }
 
@@ -77,44 +91,49 @@ LevelView ScaleSpace::level(int octave, int level) const {
 void ScaleSpace::pass(const GrayImage& image, std::size_t number) {
   Octave& octave = octaves_[number];
   Octave* const next = number + 1 < octaves_.size() ? &octaves_[number + 1] : nullptr;
-  const auto doubled_blur = static_cast<std::size_t>(layers_);
-  const int search_lag = lags_.back() + kSearchReach;
   refined_.clear();
-  for (int time = 0; time < octave.height + search_lag; ++time) {
-    if (number == 0 && time < octave.height) {
-      first_level_->make_row(image, time, octave.levels[0].row(time));
+  for (int time = 0; time < octave.height + search_lag_; time += kBlock) {
+    const auto end = [&](int y) { return std::min(y + kBlock, octave.height); };
+    for (int y = time; number == 0 && y < end(time); ++y) {
+      first_level_->make_row(image, y, octave.levels[0].row(y));
     }
     for (std::size_t level = 1; level < octave.levels.size(); ++level) {
-      const int y = time - lags_[level];
-      if (y < 0 || y >= octave.height) continue;
-      make_level_row(octave, level, y);
-      if (level != doubled_blur || next == nullptr || y % 2 == 1) continue;
-      const float* from = octave.levels[level].row(y);
-      float* to = next->levels[0].row(y / 2);
-      for (int x = 0; x < next->width; ++x) to[x] = from[2 * x];
+      const int first = time - lags_[level];
+      if (first < 0 || first >= octave.height) continue;
+      make_level_rows(octave, level, first, end(first) - first);
+      if (next == nullptr || level != static_cast<std::size_t>(layers_)) continue;
+      for (int y = first; y < end(first); y += 2) {
+        halve(octave.levels[level].row(y), next->width, next->levels[0].row(y / 2));
+      }
     }
-    const int y = time - search_lag;
-    if (y >= kBorder && y < octave.height - kBorder) search_row(octave, y);
+    const int first = std::max(time - search_lag_, kBorder);
+    for (int y = first; y < std::min(end(time - search_lag_), octave.height - kBorder); ++y) {
+      search_row(octave, y);
+    }
   }
   collect(octave, static_cast<int>(number));
 }
 
-void ScaleSpace::make_level_row(Octave& octave, std::size_t level, int y) {
+void ScaleSpace::make_level_rows(Octave& octave, std::size_t level, int y, int count) {
   const Kernel& kernel = kernels_[level - 1];
   const RowStore& below = octave.levels[level - 1];
   const auto width = static_cast<std::size_t>(octave.width);
-  for (int i = 0; i < kernel.size(); ++i) {
+  for (int i = 0; i < kernel.size() + kBlock - 1; ++i) {
     const int row = mirrored(y + i - kernel.reach(), octave.height);
     pointers_[static_cast<std::size_t>(i)] = below.row(row);
   }
-  symmetric_sum(pointers_.data(), kernel.weights.size(), kernel.weights.data(), width,
-                octave.blurred.samples());
-  octave.blurred.mirror();
-  const float* first = octave.blurred.samples() - kernel.reach();
-  for (std::size_t i = 0; i < kernel.weights.size(); ++i) pointers_[i] = first + i;
-  symmetric_sum_and_difference(pointers_.data(), kernel.weights.size(), kernel.weights.data(),
-                               width, octave.levels[level].row(y), below.row(y),
-                               octave.differences[level - 1].row(y));
+  float* blurred[kBlockRows];
+  for (std::size_t i = 0; i < kBlockRows; ++i) blurred[i] = octave.blurred[i].samples();
+  sum_columns(pointers_.data(), kernel.weights.size(), kernel.weights.data(), width, blurred);
+  for (int row = y; row < y + count; ++row) {
+    PaddedRow& along_columns = octave.blurred[static_cast<std::size_t>(row - y)];
+    along_columns.mirror();
+    const float* first = along_columns.samples() - kernel.reach();
+    for (std::size_t i = 0; i < kernel.weights.size(); ++i) pointers_[i] = first + i;
+    symmetric_sum_and_difference(pointers_.data(), kernel.weights.size(), kernel.weights.data(),
+                                 width, octave.levels[level].row(row), below.row(row),
+                                 octave.differences[level - 1].row(row));
+  }
 }
 
 void ScaleSpace::search_row(const Octave& octave, int y) {

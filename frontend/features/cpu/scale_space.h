@@ -23,10 +23,10 @@ struct Extremum {
 };
 
 // The Gaussian scale space of an image and the extrema of its differences. An octave is made in one
-// pass over its rows: each level follows the one below it as soon as that has the rows that its
-// kernel needs, and the differences of the last few rows are searched at once. Only the levels that
-// features are described in are kept whole. Buffers are allocated when the size of the image
-// changes.
+// pass over its rows, a block of them at a time: each level follows the one below it as soon as
+// that has the rows that its kernel needs, and the differences of the last few rows are searched at
+// once. Only the levels that features are described in are kept whole. Buffers are allocated when
+// the size of the image changes.
 class ScaleSpace {
  public:
   explicit ScaleSpace(const SiftOptions& options);
@@ -45,13 +45,13 @@ class ScaleSpace {
     int height;  // [samples]
     std::vector<RowStore> levels;
     std::vector<RowStore> differences;
-    PaddedRow blurred;  // along the columns, not yet along the row
+    std::vector<PaddedRow> blurred;  // a block, along the columns but not yet along the rows
   };
 
   void prepare(int width, int height);
   Octave make_octave(int index) const;
   void pass(const GrayImage& image, std::size_t octave);
-  void make_level_row(Octave& octave, std::size_t level, int y);
+  void make_level_rows(Octave& octave, std::size_t level, int y, int count);
   void search_row(const Octave& octave, int y);
   void collect(const Octave& octave, int number);
 
@@ -61,7 +61,8 @@ class ScaleSpace {
   float contrast_threshold_;
   float edge_threshold_;
   std::vector<Kernel> kernels_;  // kernels_[k - 1] makes level k from level k - 1
-  std::vector<int> lags_;        // rows by which level k follows level 0
+  std::vector<int> lags_;        // rows by which level k follows level 0, in whole blocks
+  int search_lag_;               // and the search for extrema
   int width_ = 0;                // of the image
   int height_ = 0;
   std::optional<FirstLevel> first_level_;

@@ -53,6 +53,37 @@ TEST_CASE("SIFT's rows are summed up with symmetric weights") {
   });
 }
 
+TEST_CASE("SIFT's columns are summed up, a block of rows at once") {
+  on_every_target([] {
+    std::mt19937 random(4);
+    for (const std::size_t width : {1U, 16U, 31U, 67U}) {
+      for (const std::size_t count : {3U, 5U, 21U}) {
+        std::vector<std::vector<float>> rows, out;
+        std::vector<const float*> pointers;
+        std::vector<float*> targets;
+        std::vector<float> weights;
+        for (std::size_t i = 0; i < count; ++i) {
+          weights.push_back(static_cast<float>(random() % 100) / 100);
+        }
+        for (std::size_t i = 0; i < count + kBlockRows - 1; ++i) {
+          rows.push_back(random_row(random, width, 255));
+        }
+        for (const auto& row : rows) pointers.push_back(row.data());
+        out.assign(kBlockRows, std::vector<float>(width + kRowPadding));
+        for (auto& row : out) targets.push_back(row.data());
+        sum_columns(pointers.data(), count, weights.data(), width, targets.data());
+        for (std::size_t j = 0; j < kBlockRows; ++j) {
+          for (std::size_t x = 0; x < width; ++x) {
+            double sum = 0;
+            for (std::size_t i = 0; i < count; ++i) sum += weights[i] * rows[i + j][x];
+            REQUIRE(out[j][x] == Approx(sum).margin(1e-3));
+          }
+        }
+      }
+    }
+  });
+}
+
 TEST_CASE("SIFT's rows are read and interleaved") {
   on_every_target([] {
     for (const std::size_t width : {1U, 15U, 16U, 61U}) {
