@@ -63,7 +63,8 @@ TEST_CASE("A simulated orbit is tracked to the truth", "[integration]") {
   CHECK(result.frames.read == 60);
   CHECK(result.frames.tracked == 60);
   CHECK(result.map->keyframe_count() > 5);
-  CHECK(position_error(result, source.scene()) < 0.0025 * kOrbitLength);
+  // Over ten seeds 0.14 % with a standard deviation of 0.04 %: two of them.
+  CHECK(position_error(result, source.scene()) < 0.0022 * kOrbitLength);
   for (const FrameRecord& record : result.records) {
     CHECK(record.frame.source != PoseSource::kOdometer);
   }
@@ -147,7 +148,8 @@ TEST_CASE("realtime mode tracks the same scene and joins its threads", "[integra
   const RunResult result = run_realtime(source, slam_options(), run, {});
   CHECK(result.frames.read == 60);
   CHECK(result.frames.tracked >= 58);
-  CHECK(position_error(result, source.scene()) < 0.005 * kOrbitLength);
+  // Over ten seeds 0.116 % with a standard deviation of 0.025 %: three of them, for time has a say.
+  CHECK(position_error(result, source.scene()) < 0.002 * kOrbitLength);
 }
 
 TEST_CASE("With a rate, images that come too early are dropped and counted", "[integration]") {

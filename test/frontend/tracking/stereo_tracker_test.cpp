@@ -15,7 +15,26 @@ namespace {
 constexpr double kMaxDistance = 0.003;  // [m] from the true pose; the ground is 3 m away,
 constexpr double kMaxAngle = 0.001;     // [rad] and keypoints are off by about 0.15 px
 
-// A circle over a seafloor, and a map that knows it from every second frame.
+// Moves the whole map, as a correction would: the world's axes become others.
+void move_world(const Rigid3d& new_from_old, Map& map) {
+  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
+  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
+  for (const KeyframeId id : map.view().keyframe_ids()) {
+    poses.emplace_back(id, map.view().at(id).cam_from_world * inverse(new_from_old));
+  }
+  for (const LandmarkId id : map.view().landmark_ids()) {
+    points.emplace_back(id, new_from_old * map.view().at(id).point_in_world);
+  }
+  map.move(poses, points);
+}
+
+Rigid3d turned(double angle, const Eigen::Vector3d& translation) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, -1, 2).normalized())),
+          translation};
+}
+
+// A circle over a seafloor, and a map that knows it from every second frame. The map's axes are
+// none of the cameras': else all poses of the circle would commute with its motion.
 struct World {
   explicit World(std::size_t stride = 2) {
     SyntheticSceneOptions options;
@@ -27,6 +46,15 @@ struct World {
     FillOptions fill;
     fill.stride = stride;
     filled = fill_map(scene, fill);
+    move(turned(1.1, {-1, 3, 2}));
+  }
+
+  void move(const Rigid3d& new_from_old) {
+    move_world(new_from_old, filled.map);
+    scene_from_world = scene_from_world * inverse(new_from_old);
+  }
+  Rigid3d true_pose(std::size_t index) const {
+    return scene.frames[index].cam_from_world * scene_from_world;
   }
 
   const Calibrated<RectifiedStereo>& camera() const {
@@ -43,6 +71,7 @@ struct World {
 
   SyntheticScene scene;
   FilledMap filled;
+  Rigid3d scene_from_world;
 };
 
 void check_pose(const Rigid3d& estimate, const Rigid3d& truth) {
@@ -55,19 +84,6 @@ Frame without_right(Frame frame) {
   std::fill(frame.features.u_right.begin(), frame.features.u_right.end(), kNoRightMatch);
   std::fill(frame.features.right_of_left.begin(), frame.features.right_of_left.end(), -1);
   return frame;
-}
-
-// Moves the whole map, as a correction would: the world's axes become others.
-void move_world(const Rigid3d& new_from_old, Map& map) {
-  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
-  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
-  for (const KeyframeId id : map.view().keyframe_ids()) {
-    poses.emplace_back(id, map.view().at(id).cam_from_world * inverse(new_from_old));
-  }
-  for (const LandmarkId id : map.view().landmark_ids()) {
-    points.emplace_back(id, new_from_old * map.view().at(id).point_in_world);
-  }
-  map.move(poses, points);
 }
 
 }  // namespace
@@ -84,7 +100,7 @@ TEST_CASE("A frame is tracked by the map to its true pose") {
     CHECK(tracked.time == Approx(0.1 * static_cast<double>(i)));
     CHECK(tracked.odometer_inliers > 100);
     CHECK(tracked.last_frame_inliers > 100);
-    check_pose(tracked.cam_from_world, world.scene.frames[i].cam_from_world);
+    check_pose(tracked.cam_from_world, world.true_pose(i));
     REQUIRE(world.map().find(tracked.reference) != nullptr);
     check_pose(tracked.cam_from_reference * world.map().cam_from_world(tracked.reference),
                tracked.cam_from_world);
@@ -137,11 +153,11 @@ TEST_CASE(
   REQUIRE(tracker.track(world.frame(9), world.map()).tracked());
   const TrackedFrame first = tracker.track(without_right(world.frame(10)), world.map());
   CHECK(first.prediction == Prediction::kLastPose);
-  check_pose(first.cam_from_world, world.scene.frames[10].cam_from_world);
+  check_pose(first.cam_from_world, world.true_pose(10));
   const TrackedFrame second = tracker.track(without_right(world.frame(11)), world.map());
   CHECK(second.prediction == Prediction::kConstantVelocity);
   CHECK(second.last_frame_inliers > 100);
-  check_pose(second.cam_from_world, world.scene.frames[11].cam_from_world);
+  check_pose(second.cam_from_world, world.true_pose(11));
 }
 
 TEST_CASE("Constant velocity predicts well enough for a narrow search") {
@@ -152,7 +168,7 @@ TEST_CASE("Constant velocity predicts well enough for a narrow search") {
   const TrackedFrame tracked = tracker.track(without_right(world.frame(11)), world.map());
   CHECK(tracked.prediction == Prediction::kConstantVelocity);
   CHECK(tracked.last_frame_inliers > 100);
-  check_pose(tracked.cam_from_world, world.scene.frames[11].cam_from_world);
+  check_pose(tracked.cam_from_world, world.true_pose(11));
 }
 
 TEST_CASE("The last pose follows corrections of the map") {
@@ -160,14 +176,11 @@ TEST_CASE("The last pose follows corrections of the map") {
   StereoTracker tracker = world.tracker();
   for (std::size_t i = 9; i < 12; ++i)
     REQUIRE(tracker.track(world.frame(i), world.map()).tracked());
-  const Rigid3d new_from_old(
-      Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -1, 2).normalized())),
-      {2, -1, 0.5});
-  move_world(new_from_old, world.filled.map);
+  world.move(turned(0.7, {2, -1, 0.5}));
   const TrackedFrame tracked = tracker.track(world.frame(12), world.map());
   CHECK(tracked.source == PoseSource::kLocalMap);
   CHECK(tracked.last_frame_inliers > 100);  // the prediction was right at once
-  check_pose(tracked.cam_from_world, world.scene.frames[12].cam_from_world * inverse(new_from_old));
+  check_pose(tracked.cam_from_world, world.true_pose(12));
 }
 
 TEST_CASE("Where the map does not reach, odometry holds the track and asks for a keyframe") {
@@ -182,8 +195,7 @@ TEST_CASE("Where the map does not reach, odometry holds the track and asks for a
   CHECK(tracked.source == PoseSource::kOdometer);
   CHECK(tracked.inliers < 30);
   CHECK(tracked.counts.empty());
-  CHECK(pose_scene::translation_error(tracked.cam_from_world,
-                                      world.scene.frames[11].cam_from_world) < 0.02);
+  CHECK(pose_scene::translation_error(tracked.cam_from_world, world.true_pose(11)) < 0.02);
   REQUIRE(tracked.keyframe);
   CHECK(tracked.keyframe->new_points.size() > 200);
   const TrackedFrame lost = tracker.track(without_right(world.frame(12)), world.map());
@@ -235,8 +247,7 @@ TEST_CASE("A new keyframe becomes the reference, and its new landmarks carry on 
   CHECK(tracked.source == PoseSource::kLocalMap);
   CHECK(tracked.last_frame_inliers > 50);
   CHECK(tracked.reference == id);
-  CHECK(pose_scene::translation_error(tracked.cam_from_world,
-                                      world.scene.frames[next].cam_from_world) < 0.02);
+  CHECK(pose_scene::translation_error(tracked.cam_from_world, world.true_pose(next)) < 0.02);
 }
 
 TEST_CASE("After a frame without features the camera is found again, and no motion is assumed") {
@@ -250,7 +261,7 @@ TEST_CASE("After a frame without features the camera is found again, and no moti
   const TrackedFrame found = tracker.track(world.frame(30), world.map());  // across the circle
   CHECK(found.source == PoseSource::kRelocalization);
   CHECK(found.prediction == Prediction::kNone);
-  check_pose(found.cam_from_world, world.scene.frames[30].cam_from_world);
+  check_pose(found.cam_from_world, world.true_pose(30));
   CHECK(tracker.track(without_right(world.frame(31)), world.map()).prediction ==
         Prediction::kLastPose);
 }
