@@ -26,6 +26,7 @@ constexpr std::size_t kDims = 128;
 constexpr std::size_t kPairs = kDims / 2;
 constexpr std::size_t kQueryBlock = 4;
 constexpr std::size_t kTileVectors = 8;  // train vectors that stay in the first-level cache
+static_assert(kTileVectors % 2 == 0);
 constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
 
 using D32 = hn::ScalableTag<std::int32_t>;
@@ -36,8 +37,8 @@ std::int32_t squared_length(const Descriptor& descriptor) {
   return sum;
 }
 
-// What the kernel reads and writes; arrays padded to whole vectors and whole query blocks. Padding
-// has a squared length of kFar / 2 and therefore never wins against a descriptor.
+// What the kernel reads and writes; arrays padded to pairs of vectors and whole query blocks.
+// Padding has a squared length of kFar / 2 and therefore never wins against a descriptor.
 struct Workspace {
   std::size_t lanes;
   std::size_t train_vectors;
@@ -64,7 +65,7 @@ hwy::AlignedFreeUniquePtr<std::int32_t[]> filled(std::size_t count, std::int32_t
 Workspace prepare(std::span<const Descriptor> query, std::span<const Descriptor> train) {
   Workspace w;
   w.lanes = hn::Lanes(D32());
-  w.train_vectors = (train.size() + w.lanes - 1) / w.lanes;
+  w.train_vectors = (train.size() + 2 * w.lanes - 1) / (2 * w.lanes) * 2;
   w.query_blocks = (query.size() + kQueryBlock - 1) / kQueryBlock;
   const std::size_t padded_train = w.train_vectors * w.lanes;
   const std::size_t padded_query = w.query_blocks * kQueryBlock;
@@ -96,11 +97,17 @@ struct Products {
   V q0, q1, q2, q3;
 };
 
-// Scalar products of four queries (rows of kDims) with the descriptors of one train vector.
+template <class V>
+struct ProductPair {
+  Products<V> left, right;
+};
+
+// Scalar products of four queries (rows of kDims) with the descriptors of two train vectors: with
+// two, each number of a query that is loaded serves twice.
 #if HWY_TARGET == HWY_SCALAR
 // Its vectors have one lane of any width and cannot be reinterpreted: the baseline target.
 template <class D, class V = hn::Vec<D>>
-Products<V> multiply(D d32, const std::int16_t* query, const std::int16_t* train) {
+Products<V> multiply_one(D d32, const std::int16_t* query, const std::int16_t* train) {
   std::int32_t sum[kQueryBlock] = {};
   for (std::size_t k = 0; k < kDims; ++k) {
     for (std::size_t row = 0; row < kQueryBlock; ++row)
@@ -108,13 +115,19 @@ Products<V> multiply(D d32, const std::int16_t* query, const std::int16_t* train
   }
   return {hn::Set(d32, sum[0]), hn::Set(d32, sum[1]), hn::Set(d32, sum[2]), hn::Set(d32, sum[3])};
 }
+
+template <class D, class V = hn::Vec<D>>
+ProductPair<V> multiply(D d32, const std::int16_t* query, const std::int16_t* train) {
+  return {multiply_one(d32, query, train), multiply_one(d32, query, train + kDims)};
+}
 #else
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE Products<V> multiply(D d32, const std::int16_t* HWY_RESTRICT query,
-                                const std::int16_t* HWY_RESTRICT train) {
+HWY_INLINE ProductPair<V> multiply(D d32, const std::int16_t* HWY_RESTRICT query,
+                                   const std::int16_t* HWY_RESTRICT train) {
   const hn::Repartition<std::int16_t, D> d16;
-  V a0 = hn::Zero(d32), a1 = a0, a2 = a0, a3 = a0;  // sums of the first, and where the
-  V b0 = a0, b1 = a0, b2 = a0, b3 = a0;             // machine needs it, the second of each pair
+  const V zero = hn::Zero(d32);
+  Products<V> a{zero, zero, zero, zero}, c = a;  // sums of the first, and where the machine
+  Products<V> b = a, e = a;                      // needs it, the second of each pair
   const std::size_t stride = 2 * hn::Lanes(d32);
   const auto two_dims = [&](std::size_t row, std::size_t pair) HWY_ATTR {
     std::int32_t both;
@@ -122,14 +135,27 @@ HWY_INLINE Products<V> multiply(D d32, const std::int16_t* HWY_RESTRICT query,
     return hn::BitCast(d16, hn::Set(d32, both));
   };
   for (std::size_t p = 0; p < kPairs; ++p) {
-    const auto t = hn::Load(d16, train + p * stride);
-    a0 = hn::ReorderWidenMulAccumulate(d32, two_dims(0, p), t, a0, b0);
-    a1 = hn::ReorderWidenMulAccumulate(d32, two_dims(1, p), t, a1, b1);
-    a2 = hn::ReorderWidenMulAccumulate(d32, two_dims(2, p), t, a2, b2);
-    a3 = hn::ReorderWidenMulAccumulate(d32, two_dims(3, p), t, a3, b3);
+    const auto left = hn::Load(d16, train + p * stride);
+    const auto right = hn::Load(d16, train + (kPairs + p) * stride);
+    const auto q0 = two_dims(0, p);
+    a.q0 = hn::ReorderWidenMulAccumulate(d32, q0, left, a.q0, b.q0);
+    c.q0 = hn::ReorderWidenMulAccumulate(d32, q0, right, c.q0, e.q0);
+    const auto q1 = two_dims(1, p);
+    a.q1 = hn::ReorderWidenMulAccumulate(d32, q1, left, a.q1, b.q1);
+    c.q1 = hn::ReorderWidenMulAccumulate(d32, q1, right, c.q1, e.q1);
+    const auto q2 = two_dims(2, p);
+    a.q2 = hn::ReorderWidenMulAccumulate(d32, q2, left, a.q2, b.q2);
+    c.q2 = hn::ReorderWidenMulAccumulate(d32, q2, right, c.q2, e.q2);
+    const auto q3 = two_dims(3, p);
+    a.q3 = hn::ReorderWidenMulAccumulate(d32, q3, left, a.q3, b.q3);
+    c.q3 = hn::ReorderWidenMulAccumulate(d32, q3, right, c.q3, e.q3);
   }
-  return {hn::RearrangeToOddPlusEven(a0, b0), hn::RearrangeToOddPlusEven(a1, b1),
-          hn::RearrangeToOddPlusEven(a2, b2), hn::RearrangeToOddPlusEven(a3, b3)};
+  const auto sums = [](const Products<V>& odd, const Products<V>& even) HWY_ATTR {
+    return Products<V>{
+        hn::RearrangeToOddPlusEven(odd.q0, even.q0), hn::RearrangeToOddPlusEven(odd.q1, even.q1),
+        hn::RearrangeToOddPlusEven(odd.q2, even.q2), hn::RearrangeToOddPlusEven(odd.q3, even.q3)};
+  };
+  return {sums(a, b), sums(c, e)};
 }
 #endif
 
@@ -159,6 +185,15 @@ HWY_INLINE void enter(D d32, Workspace& w, std::size_t query, std::size_t vector
   hn::Store(hn::IfThenElse(closer, this_query, train_index), d32, w.train_index.get() + t);
 }
 
+template <class D, class V>
+HWY_INLINE void enter_all(D d32, Workspace& w, std::size_t query, std::size_t vector,
+                          const Products<V>& products) {
+  enter(d32, w, query, vector, products.q0);
+  enter(d32, w, query + 1, vector, products.q1);
+  enter(d32, w, query + 2, vector, products.q2);
+  enter(d32, w, query + 3, vector, products.q3);
+}
+
 void compare_all(Workspace& w) {
   const D32 d32;
   for (std::size_t tile = 0; tile < w.train_vectors; tile += kTileVectors) {
@@ -166,12 +201,10 @@ void compare_all(Workspace& w) {
     for (std::size_t block = 0; block < w.query_blocks; ++block) {
       const std::size_t query = block * kQueryBlock;
       const std::int16_t* rows = w.query.get() + query * kDims;
-      for (std::size_t v = tile; v < end; ++v) {
+      for (std::size_t v = tile; v < end; v += 2) {
         const auto products = multiply(d32, rows, w.train.get() + v * w.lanes * kDims);
-        enter(d32, w, query, v, products.q0);
-        enter(d32, w, query + 1, v, products.q1);
-        enter(d32, w, query + 2, v, products.q2);
-        enter(d32, w, query + 3, v, products.q3);
+        enter_all(d32, w, query, v, products.left);
+        enter_all(d32, w, query, v + 1, products.right);
       }
     }
   }
