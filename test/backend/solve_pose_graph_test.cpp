@@ -76,10 +76,19 @@ TEST_CASE("scattered poses: the descent never goes up, and the solver finds the 
   const FactorGraph expected = solved_by_ceres(test.graph);
   scatter(test.graph, random);
   const PoseGraphProblem problem(test.graph);
-  std::vector<Rigid3d> poses = poses_of(test.graph);
-  const PoseGraphDescent descent = problem.descend(poses, {});
-  CHECK(problem.cost(poses) == Approx(descent.cost).epsilon(1e-12));
-  CHECK(descent.cost <= descent.initial_cost);
+  int ended_uphill = 0;
+  for (int trial = 0; trial < 10; ++trial) {
+    scatter(test.graph, random);
+    std::vector<Rigid3d> poses = poses_of(test.graph);
+    double last = problem.cost(poses);
+    const PoseGraphDescent descent = problem.descend(poses, {}, {}, [&](int, double cost) {
+      CHECK(cost <= last);
+      last = cost;
+    });
+    CHECK(problem.cost(poses) == Approx(descent.cost).epsilon(1e-12));
+    ended_uphill += descent.end == DescentEnd::kUphill;
+  }
+  CHECK(ended_uphill > 0);
 
   FactorGraph graph = test.graph;
   const PoseGraphSummary result = solve_pose_graph(graph, {});
@@ -89,27 +98,28 @@ TEST_CASE("scattered poses: the descent never goes up, and the solver finds the 
 }
 
 TEST_CASE("where no solution explains the noise every start is tried and the lowest cost kept") {
-  Random random(4);
-  TestPoseGraph test = grid_pose_graph({4, 4, 2}, kNoise, random);
-  for (std::size_t e = 0; e < test.graph.edges.size(); e += 5) {
-    GraphEdge& edge = test.graph.edges[e];
-    edge.a_from_b = edge.a_from_b * random.rigid(2, 2);
+  for (std::uint64_t seed = 40; seed < 50; ++seed) {
+    Random random(seed);
+    TestPoseGraph test = grid_pose_graph({4, 4, 2}, kNoise, random);
+    for (std::size_t e = 0; e < test.graph.edges.size(); e += 5) {
+      GraphEdge& edge = test.graph.edges[e];
+      edge.a_from_b = edge.a_from_b * random.rigid(2, 2);
+    }
+    scatter(test.graph, random);
+    const PoseGraphSummary result = solve_pose_graph(test.graph, {});
+    REQUIRE(result.attempts.size() == 3);
+    double lowest = result.attempts[0].cost;
+    double last_start = 0;
+    for (const PoseGraphAttempt& attempt : result.attempts) {
+      lowest = std::min(lowest, attempt.cost);
+      CHECK(attempt.cost <= attempt.start_cost);
+      CHECK(attempt.start_cost >= last_start);
+      last_start = attempt.start_cost;
+      if (attempt.start == result.start) CHECK(attempt.cost == result.summary.final_cost);
+    }
+    CHECK(result.summary.final_cost == lowest);
+    CHECK(cost(test.graph) == Approx(lowest).epsilon(1e-12));
   }
-  const double given_cost = cost(test.graph);
-  const PoseGraphSummary result = solve_pose_graph(test.graph, {});
-  CHECK(result.attempts.size() == 3);
-  double lowest = result.attempts[0].cost;
-  double last_start = 0;
-  for (const PoseGraphAttempt& attempt : result.attempts) {
-    lowest = std::min(lowest, attempt.cost);
-    CHECK(attempt.cost <= attempt.start_cost);
-    CHECK(attempt.start_cost >= last_start);
-    last_start = attempt.start_cost;
-    if (attempt.start == result.start) CHECK(attempt.cost == result.summary.final_cost);
-  }
-  CHECK(result.summary.final_cost == lowest);
-  CHECK(result.summary.final_cost < given_cost);
-  CHECK(cost(test.graph) == Approx(lowest).epsilon(1e-12));
 }
 
 TEST_CASE("exact measurements end at the truth, also where the file starts there") {

@@ -217,7 +217,8 @@ def main():
     where = machine()
     arguments = (pathlib.Path(options.data) / "graphs", options.only, options.repeat)
     batch, ours = table(BATCH, *arguments, "cpu_s", [
-        ("cost", significant("cost")), ("SE-Sync F", se_sync), ("CPU s", show("cpu_s", 3)),
+        ("cost", significant("cost")), ("SE-Sync F", se_sync),
+        ("iterations", show("iterations", 0)), ("CPU s", show("cpu_s", 3)),
         ("wall s", show("wall_s", 3)), ("peak MB", show("peak_memory_mb", 0))])
     incremental, _ = table(INCREMENTAL, *arguments, "mean_cpu_ms", [
         ("cost", significant("cost")), ("mean CPU ms", show("mean_cpu_ms", 2)),
