@@ -9,6 +9,7 @@
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/hybrid_slam/progress.h"
+#include "backend/problem/solver_log.h"
 #include "cameras/input_error.h"
 #include "cameras/output_file.h"
 
@@ -93,6 +94,7 @@ int run(const CommandLine& line) {
 }
 
 int guarded_main(int argc, char** argv) {
+  silence_solver_log();
   spdlog::set_default_logger(spdlog::stderr_color_mt("hybrid_slam"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   try {

@@ -10,18 +10,22 @@ namespace {
 
 constexpr const char* kFooter = R"(INPUT is told by its content:
   a BAL problem, a g2o pose graph (SE3), a COLMAP model (folder, text or binary), a stereo bundle
-  problem in GTSAM's three files (the folder or the file of the factors), a stereo stream (.seq)
+  problem in GTSAM's three files (the folder or the file of the factors), a stereo stream (.seq),
+  a map file (.hslam)
 
 Writes to DIR:
-  optimized.txt, .g2o, .seq or optimized/   the result in the format of the input
+  optimized.txt, .g2o, .seq, .hslam or optimized/   the result in the format of the input
   optimized.tum   poses in time, world_from_cam, where the input has times
+  updates.csv     time and cost of each update, of --problem incremental
   report.json     costs, errors, times, outliers by name
 
 Exit codes: 0 done; 1 internal error; 2 bad usage; 3 bad input or output folder; 4 nothing to
 optimise, or no solution; 130 interrupted, the estimate so far is saved.)";
 
-const std::map<std::string, ProblemKind> kProblems{
-    {"full", ProblemKind::kFull}, {"loop", ProblemKind::kLoop}, {"local", ProblemKind::kLocal}};
+const std::map<std::string, ProblemKind> kProblems{{"full", ProblemKind::kFull},
+                                                   {"loop", ProblemKind::kLoop},
+                                                   {"local", ProblemKind::kLocal},
+                                                   {"incremental", ProblemKind::kIncremental}};
 
 const std::map<std::string, Loss> kLosses{
     {"none", Loss::kNone}, {"huber", Loss::kHuber}, {"cauchy", Loss::kCauchy}};
@@ -51,15 +55,22 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   CommandLine line;
   OptimizerOptions& options = line.options;
   GraphFormat format = GraphFormat::kBal;
+  Loss loss = Loss::kNone;
+  std::string frame;
 
   CLI::App app("Optimises a map, a bundle adjustment problem or a pose graph.", "map_optimizer");
   app.footer(kFooter);
   app.add_option("INPUT", line.input, "file or folder")->required();
   add_choice(app, "--problem", options.problem, kProblems,
-             "full (default: all that is not fixed), loop (poses by their edges alone) or local "
-             "(the last frame and its neighbours)");
-  add_choice(app, "--robust", options.loss, kLosses,
-             "none (default), huber or cauchy: loss of observations and of edges that are loops");
+             "full (default: all that is not fixed), loop (poses by their edges alone), local (the "
+             "last frame and its neighbours) or incremental (frame by frame)");
+  const auto* given_loss = add_choice(
+      app, "--robust", loss, kLosses,
+      "none, huber or cauchy: loss of observations and of edges that are loops (default: "
+      "none; of a map: huber, then none without what is beyond its threshold)");
+  const auto* given_frame =
+      app.add_option("--keyframe", frame, "of --problem local: around this one, not the last")
+          ->option_text("NAME");
   add_choice(app, "--start", options.start, kStarts,
              "of a pose graph: auto (default: the lowest cost of the three), given, tree or "
              "rotations");
@@ -73,11 +84,15 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--out", line.out, "folder for the results, made if missing")
       ->capture_default_str();
   const auto* given_format = add_choice(app, "--format", format, formats(),
-                                        "of the result (default: the input's); a COLMAP model can "
-                                        "be written as colmap-text or colmap-binary");
+                                        "of the result (default: the input's): colmap-text or "
+                                        "colmap-binary of a COLMAP model, ply of a map, map of "
+                                        "all but pose graphs");
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
   try {
     app.parse(argc, argv);
+    if (given_frame->count() > 0 && options.problem != ProblemKind::kLocal) {
+      throw CLI::ValidationError("--keyframe: goes with --problem local");
+    }
     if (line.out.empty()) throw CLI::ValidationError("--out: \"\" is no name of a folder");
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // --help
@@ -89,6 +104,8 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
     return std::nullopt;
   }
   if (given_format->count() > 0) line.format = format;
+  if (given_loss->count() > 0) options.loss = loss;
+  if (given_frame->count() > 0) options.frame = frame;
   return line;
 }
 

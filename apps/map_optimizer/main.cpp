@@ -2,11 +2,13 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 
 #include "apps/io/report.h"
 #include "apps/map_optimizer/outputs.h"
+#include "backend/problem/solver_log.h"
 #include "cameras/output_file.h"
 
 namespace hybrid_slam {
@@ -21,8 +23,24 @@ void on_signal(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+// Frame by frame, with a line per update.
+void solve_incrementally(const CommandLine& line, const GraphFile& file, FactorGraph& problem,
+                         OptimizerResult& result) {
+  std::stop_source stop;
+  const auto progress = [&](const UpdateRecord& update) {
+    if (interrupted) stop.request_stop();
+    if (line.quiet) return;
+    fmt::print(stderr, "poses {:5}  cost {:<18.10g} {:.3f} ms\n", update.poses, update.cost,
+               update.wall_ms);
+  };
+  IncrementalRun run =
+      run_incremental(file, incremental_options(line.options), stop.get_token(), progress, problem);
+  result.updates = std::move(run.updates);
+  result.solve = summary_of(run, problem);
+}
+
 // The solver, with a line per iteration, until it ends or the user asks for it.
-void solve(const CommandLine& line, FactorGraph& problem, OptimizerResult& result) {
+void solve(const CommandLine& line, OptimizerProblem& problem, OptimizerResult& result) {
   std::stop_source stop;
   const auto progress = [&](const IterationReport& report) {
     if (interrupted) stop.request_stop();
@@ -30,24 +48,37 @@ void solve(const CommandLine& line, FactorGraph& problem, OptimizerResult& resul
     fmt::print(stderr, "iteration {:3}  cost {:<18.10g} step {:<10.3g} {:.2f} s\n",
                report.iteration, report.cost, report.step_norm, report.seconds);
   };
-  if (is_pose_graph(problem) && line.options.loss == Loss::kNone) {
-    const PoseGraphSummary pose_graph =
-        solve_pose_graph(problem, pose_graph_options(line.options), stop.get_token(), progress);
+  if (is_pose_graph(problem.graph) && loss_of(line.options) == Loss::kNone) {
+    const PoseGraphSummary pose_graph = solve_pose_graph(
+        problem.graph, pose_graph_options(line.options), stop.get_token(), progress);
     result.start = pose_graph.start;
     result.solve = pose_graph.summary;
   } else {
-    result.start = choose_start(line.options, problem);
-    result.solve = solve_graph(problem, solver_options(line.options), stop.get_token(), progress);
+    result.start = choose_start(line.options, problem.graph);
+    result.solve = solve_graph(problem.graph, problem.options, stop.get_token(), progress);
+  }
+}
+
+// What --problem incremental cannot do.
+void warn_of_limits(const OptimizerOptions& options, const FactorGraph& graph) {
+  const bool refines = std::any_of(graph.cameras.begin(), graph.cameras.end(),
+                                   [](const GraphCamera& camera) { return camera.refined != 0; });
+  if (refines && !options.fix_intrinsics) {
+    spdlog::warn("incremental: the intrinsics are kept as they are");
+  }
+  if (loss_of(options) != Loss::kNone && !graph.edges.empty()) {
+    spdlog::warn("incremental: edges take no robust loss");
   }
 }
 
 // Only the estimate goes back to the file's graph: what a problem fixes or leaves out is its own.
-void take_estimate(const FactorGraph& from, FactorGraph& to) {
-  for (std::size_t i = 0; i < to.frames.size(); ++i) {
-    to.frames[i].cam_from_world = from.frames[i].cam_from_world;
+void take_estimate(const OptimizerProblem& problem, FactorGraph& to) {
+  const FactorGraph& from = problem.graph;
+  for (std::size_t i = 0; i < from.frames.size(); ++i) {
+    to.frames[problem.frames[i]].cam_from_world = from.frames[i].cam_from_world;
   }
-  for (std::size_t i = 0; i < to.points.size(); ++i) {
-    to.points[i].in_world = from.points[i].in_world;
+  for (std::size_t i = 0; i < from.points.size(); ++i) {
+    to.points[problem.points[i]].in_world = from.points[i].in_world;
   }
   for (std::size_t i = 0; i < to.cameras.size(); ++i) {
     to.cameras[i].camera = from.cameras[i].camera;
@@ -57,10 +88,14 @@ void take_estimate(const FactorGraph& from, FactorGraph& to) {
 OptimizerResult optimize(const CommandLine& line, const GraphFile& file, PhaseTimes& times) {
   OptimizerResult result;
   result.graph = file.graph;
-  FactorGraph problem = make_problem(file.graph, line.options, line.input);
+  result.problem = make_problem(file, line.options, line.input);
   times.end("build");
-  solve(line, problem, result);
-  if (result.solve.end != SolveEnd::kFailed) take_estimate(problem, result.graph);
+  if (line.options.problem == ProblemKind::kIncremental) {
+    solve_incrementally(line, file, result.problem.graph, result);
+  } else {
+    solve(line, result.problem, result);
+  }
+  if (result.solve.end != SolveEnd::kFailed) take_estimate(result.problem, result.graph);
   times.end("solve");
   result.initial_cost = cost(file.graph);
   result.final_cost = cost(result.graph);
@@ -95,6 +130,7 @@ int run(const CommandLine& line) {
                  name_of(file.format), file.graph.frames.size(), file.graph.points.size(),
                  file.graph.observations.size(), file.graph.edges.size());
   }
+  if (line.options.problem == ProblemKind::kIncremental) warn_of_limits(line.options, file.graph);
   times.end("read");
   const OptimizerResult result = optimize(line, file, times);
   write_graph(line, file, result);
@@ -108,6 +144,7 @@ int run(const CommandLine& line) {
 }
 
 int guarded_main(int argc, char** argv) {
+  silence_solver_log();
   spdlog::set_default_logger(spdlog::stderr_color_mt("map_optimizer"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   try {

@@ -1,12 +1,16 @@
 #include "apps/map_optimizer/outputs.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "apps/hybrid_slam/version.h"
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
+#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -22,6 +26,8 @@ const char* name_of(ProblemKind kind) {
       return "loop";
     case ProblemKind::kLocal:
       return "local";
+    case ProblemKind::kIncremental:
+      return "incremental";
   }
   throw std::logic_error("no such kind of problem");
 }
@@ -85,16 +91,24 @@ Json errors_json(const OptimizerResult& result) {
   return json;
 }
 
-Json observations_json(const GraphFile& file, const FactorGraph& graph,
+Json observations_json(const GraphFile& file, const OptimizerProblem& problem,
                        const std::vector<std::uint32_t>& indices) {
   Json json = Json::array();
   for (const std::uint32_t index : indices) {
-    const GraphObservation& observation = graph.observations[index];
-    const auto squared = squared_error(graph, observation);
-    json.push_back({{"frame", file.frame_names[observation.frame]},
-                    {"point", file.point_ids[observation.point]},
+    const GraphObservation& observation = problem.graph.observations[index];
+    const auto squared = squared_error(problem.graph, observation);
+    json.push_back({{"frame", file.frame_names[problem.frames[observation.frame]]},
+                    {"point", file.point_ids[problem.points[observation.point]]},
                     {"error_px", squared ? Json(std::sqrt(*squared)) : Json()}});
   }
+  return json;
+}
+
+// The loss, or those of the rounds of a map.
+Json robust_json(const OptimizerProblem& problem, const OptimizerOptions& options) {
+  if (problem.options.rounds.size() == 1) return name_of(loss_of(options));
+  Json json = Json::array();
+  for (const SolveRound& round : problem.options.rounds) json.push_back(name_of(round.loss));
   return json;
 }
 
@@ -106,6 +120,35 @@ Json times_json(const PhaseTimes& times, double PhaseTimes::Phase::*which) {
     sum += phase.*which;
   }
   json["total"] = sum;
+  return json;
+}
+
+// updates.csv, and what the report says of it.
+void write_updates(const fs::path& path, const std::vector<UpdateRecord>& updates) {
+  std::string text = "update,poses,cpu_ms,wall_ms,cost\n";
+  for (std::size_t i = 0; i < updates.size(); ++i) {
+    const UpdateRecord& u = updates[i];
+    fmt::format_to(std::back_inserter(text), "{},{},{:.3f},{:.3f},{}\n", i, u.poses, u.cpu_ms,
+                   u.wall_ms, u.cost);
+  }
+  write_file(path, text);
+}
+
+Json updates_json(const std::vector<UpdateRecord>& updates) {
+  Json json;
+  json["count"] = updates.size();
+  const auto add = [&](const std::string& name, double UpdateRecord::*which) {
+    double sum = 0;
+    double most = 0;
+    for (const UpdateRecord& update : updates) {
+      sum += update.*which;
+      most = std::max(most, update.*which);
+    }
+    json["mean_" + name] = sum / static_cast<double>(updates.size());
+    json["max_" + name] = most;
+  };
+  add("cpu_ms", &UpdateRecord::cpu_ms);
+  add("wall_ms", &UpdateRecord::wall_ms);
   return json;
 }
 
@@ -162,6 +205,7 @@ void write_graph(const CommandLine& line, const GraphFile& file, const Optimizer
   if (!file.times.empty()) {
     write_tum(fs::path(line.out) / "optimized.tum", trajectory_of(file.times, result.graph));
   }
+  if (!result.updates.empty()) write_updates(fs::path(line.out) / "updates.csv", result.updates);
 }
 
 void write_report(const CommandLine& line, const GraphFile& file, const OptimizerResult& result,
@@ -171,19 +215,20 @@ void write_report(const CommandLine& line, const GraphFile& file, const Optimize
   json["input"] = line.input;
   json["format"] = name_of(file.format);
   json["problem"] = name_of(line.options.problem);
-  json["robust"] = name_of(line.options.loss);
+  json["robust"] = robust_json(result.problem, line.options);
   json["fixed_intrinsics"] = line.options.fix_intrinsics;
   json["threads"] = line.options.threads;
   json["counts"] = counts_json(result.graph);
-  if (!file.graph.edges.empty()) json["start"] = name_of(result.start);
+  if (!result.problem.graph.edges.empty()) json["start"] = name_of(result.start);
   json["initial_cost"] = result.initial_cost;
   json["final_cost"] = result.final_cost;
   json["reprojection_rmse_px"] = errors_json(result);
   json["ate"] = ate_json(file, result.graph);
+  if (!result.updates.empty()) json["updates"] = updates_json(result.updates);
   json["iterations"] = solve.iterations;
   json["termination"] = {{"end", to_string(solve.end)}, {"text", solve.text}};
-  json["outliers"] = observations_json(file, result.graph, solve.outliers);
-  json["unprojectable"] = observations_json(file, result.graph, solve.unprojectable);
+  json["outliers"] = observations_json(file, result.problem, solve.outliers);
+  json["unprojectable"] = observations_json(file, result.problem, solve.unprojectable);
   json["seconds"] = times_json(times, &PhaseTimes::Phase::seconds);
   json["cpu_seconds"] = times_json(times, &PhaseTimes::Phase::cpu_seconds);
   json["solver_seconds"] = solver_json(solve);

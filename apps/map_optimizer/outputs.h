@@ -9,6 +9,7 @@
 
 #include "apps/io/graphs/graph_errors.h"
 #include "apps/map_optimizer/command_line.h"
+#include "apps/map_optimizer/incremental.h"
 
 namespace hybrid_slam {
 
@@ -34,10 +35,12 @@ class PhaseTimes {
 
 // What came of a run.
 struct OptimizerResult {
-  FactorGraph graph;  // the file's, with the estimate
+  FactorGraph graph;         // the file's, with the estimate
+  OptimizerProblem problem;  // as it was solved
   PoseGraphStart start = PoseGraphStart::kGiven;
   GraphSummary solve;
-  double initial_cost = 0;  // of the whole file, as it was read
+  std::vector<UpdateRecord> updates;  // of an incremental run
+  double initial_cost = 0;            // of the whole file, as it was read
   double final_cost = 0;
   std::map<std::string, ReprojectionError> initial_errors, final_errors;
 };
@@ -45,7 +48,8 @@ struct OptimizerResult {
 // Throws InputError if the file cannot be written in the format that is asked for.
 const GraphWriter& find_writer(const CommandLine& line, const GraphFile& file);
 
-// The optimised graph, and its trajectory where the file has times. Throws OutputError.
+// The optimised graph, its trajectory where the file has times, and the updates of an incremental
+// run. Throws OutputError.
 void write_graph(const CommandLine& line, const GraphFile& file, const OptimizerResult& result);
 
 // report.json. Throws OutputError.

@@ -4,7 +4,10 @@
 #include <limits>
 #include <numeric>
 
+#include "backend/problem/full_bundle.h"
 #include "backend/problem/local_bundle.h"
+#include "backend/problem/loop_graph.h"
+#include "backend/problem/map_graph.h"
 
 namespace hybrid_slam {
 
@@ -23,34 +26,35 @@ std::vector<std::vector<std::uint32_t>> points_by_frame(const FactorGraph& graph
   return points;
 }
 
-// The last frame and those that share most points with it.
-std::vector<std::size_t> local_frames(const FactorGraph& graph,
+// A frame and those that share most points with it.
+std::vector<std::size_t> local_frames(const FactorGraph& graph, std::size_t around,
                                       const std::vector<std::vector<std::uint32_t>>& points) {
   const LocalBundleOptions window;
-  const std::size_t newest = graph.frames.size() - 1;
   std::vector<char> seen(graph.points.size());
-  for (const std::uint32_t point : points[newest]) seen[point] = 1;
-  std::vector<std::size_t> frames(newest);
+  for (const std::uint32_t point : points[around]) seen[point] = 1;
+  std::vector<std::size_t> frames(graph.frames.size());
   std::iota(frames.begin(), frames.end(), 0);
-  std::vector<std::ptrdiff_t> shared(newest);
+  std::vector<std::ptrdiff_t> shared(frames.size());
   for (const std::size_t i : frames) {
     shared[i] = std::count_if(points[i].begin(), points[i].end(),
                               [&](std::uint32_t point) { return seen[point] != 0; });
   }
-  std::erase_if(frames, [&](std::size_t i) { return shared[i] < window.min_shared_landmarks; });
+  std::erase_if(frames, [&](std::size_t i) {
+    return i == around || shared[i] < window.min_shared_landmarks;
+  });
   std::stable_sort(frames.begin(), frames.end(),
                    [&](std::size_t a, std::size_t b) { return shared[a] > shared[b]; });
   frames.resize(std::min(frames.size(), window.max_neighbours));
-  frames.push_back(newest);
+  frames.push_back(around);
   return frames;
 }
 
 // Fixes all but the window, and the cameras: what so few frames say of them is little.
-void restrict_to_window(FactorGraph& graph) {
+void restrict_to_window(FactorGraph& graph, std::size_t around) {
   const auto points = points_by_frame(graph);
   std::vector<char> frame_varies(graph.frames.size());
   std::vector<char> point_varies(graph.points.size());
-  for (const std::size_t frame : local_frames(graph, points)) {
+  for (const std::size_t frame : local_frames(graph, around, points)) {
     frame_varies[frame] = 1;
     for (const std::uint32_t point : points[frame]) point_varies[point] = 1;
   }
@@ -76,21 +80,92 @@ std::vector<PoseGraphStart> starts_of(StartChoice choice) {
   }
 }
 
-}  // namespace
+// The frame of kLocal.
+std::size_t find_frame(const GraphFile& file, const OptimizerOptions& options,
+                       const std::filesystem::path& input) {
+  if (!options.frame) return file.graph.frames.size() - 1;
+  const auto found = std::find(file.frame_names.begin(), file.frame_names.end(), *options.frame);
+  if (found == file.frame_names.end()) {
+    throw InputError(input.string() + ": has no frame \"" + *options.frame + "\"");
+  }
+  return static_cast<std::size_t>(found - file.frame_names.begin());
+}
 
-FactorGraph make_problem(const FactorGraph& graph, const OptimizerOptions& options,
+// The bundles and the loop graph of the backend.
+ProblemConfig map_config(const GraphFile& file, const OptimizerOptions& options,
                          const std::filesystem::path& input) {
-  FactorGraph problem = graph;
+  const MapSnapshot& map = *file.map;
+  if (options.problem == ProblemKind::kLoop) return make_loop_graph(map, {}, {});
+  if (options.problem == ProblemKind::kFull) return make_full_bundle(map, {});
+  return make_local_bundle(map, map.keyframe_ids()[find_frame(file, options, input)], {});
+}
+
+template <typename Id>
+std::vector<std::uint32_t> places_of(const std::vector<Id>& ids, const std::vector<Id>& all) {
+  std::vector<std::uint32_t> places;
+  for (const Id id : ids) {
+    places.push_back(
+        static_cast<std::uint32_t>(std::lower_bound(all.begin(), all.end(), id) - all.begin()));
+  }
+  return places;
+}
+
+OptimizerProblem make_map_problem(const GraphFile& file, const OptimizerOptions& options,
+                                  const std::filesystem::path& input) {
+  const ProblemConfig config = map_config(file, options, input);
+  MapGraph made = make_graph(*file.map, config);
+  OptimizerProblem problem;
+  problem.graph = std::move(made.graph);
+  problem.frames = places_of(made.frames, file.map->keyframe_ids());
+  problem.points = places_of(made.points, file.map->landmark_ids());
+  problem.options = config.options;
+  problem.options.rounds.back().iterations = options.iterations;
+  return problem;
+}
+
+void restrict(const GraphFile& file, const OptimizerOptions& options,
+              const std::filesystem::path& input, FactorGraph& problem) {
   if (options.fix_intrinsics) {
     for (GraphCamera& camera : problem.cameras) camera.refined = 0;
   }
   if (options.problem == ProblemKind::kLoop) {
-    if (graph.edges.empty()) throw InputError(input.string() + ": holds no edges between poses");
+    if (problem.edges.empty()) throw InputError(input.string() + ": holds no edges between poses");
     problem.observations.clear();
   } else if (options.problem == ProblemKind::kLocal) {
-    if (graph.observations.empty()) throw InputError(input.string() + ": holds no observations");
-    restrict_to_window(problem);
+    if (problem.observations.empty()) throw InputError(input.string() + ": holds no observations");
+    restrict_to_window(problem, find_frame(file, options, input));
   }
+}
+
+std::vector<std::uint32_t> count_up(std::size_t size) {
+  std::vector<std::uint32_t> values(size);
+  std::iota(values.begin(), values.end(), 0);
+  return values;
+}
+
+}  // namespace
+
+Loss loss_of(const OptimizerOptions& options) { return options.loss.value_or(Loss::kNone); }
+
+OptimizerProblem make_problem(const GraphFile& file, const OptimizerOptions& options,
+                              const std::filesystem::path& input) {
+  const bool bundles_of_map = file.map != nullptr && !file.graph.frames.empty() &&
+                              options.problem != ProblemKind::kIncremental;
+  OptimizerProblem problem;
+  if (bundles_of_map) {
+    problem = make_map_problem(file, options, input);
+  } else {
+    problem.graph = file.graph;
+    problem.frames = count_up(file.graph.frames.size());
+    problem.points = count_up(file.graph.points.size());
+    restrict(file, options, input, problem.graph);
+  }
+  if (!bundles_of_map || options.loss) {
+    problem.options.rounds = {{options.iterations, loss_of(options), kFunctionTolerance}};
+    problem.options.loop_loss = loss_of(options);
+    problem.options.trust_region = kTrustRegion;
+  }
+  problem.options.threads = options.threads;
   return problem;
 }
 
@@ -123,12 +198,9 @@ PoseGraphOptions pose_graph_options(const OptimizerOptions& options) {
   return solver;
 }
 
-ProblemOptions solver_options(const OptimizerOptions& options) {
-  ProblemOptions solver;
-  solver.rounds = {{options.iterations, options.loss, kFunctionTolerance}};
-  solver.loop_loss = options.loss;
-  solver.trust_region = kTrustRegion;
-  solver.threads = options.threads;
+IncrementalOptions incremental_options(const OptimizerOptions& options) {
+  IncrementalOptions solver;
+  solver.loss = loss_of(options);
   return solver;
 }
 

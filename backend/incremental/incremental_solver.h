@@ -81,8 +81,12 @@ class IncrementalSolver final : private TermSource {
   Eigen::Vector3d point(std::uint32_t index) const;
   std::size_t pose_count() const { return poses_.size(); }
 
-  // The terms that are there, at the present estimate: for costs, and for a batch solver.
+  // The terms that are there, at the present estimate: for a batch solver.
   FactorGraph graph() const;
+
+  // Half the sum of squares, without a loss, of all observations that project and of all edges at
+  // the present estimate. Evaluates each.
+  double cost() const;
 
  private:
   enum class TermKind : std::uint8_t { kEdge, kLandmark, kPrior };

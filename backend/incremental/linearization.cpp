@@ -154,6 +154,23 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
   return result;
 }
 
+double IncrementalSolver::cost() const {
+  double sum = 0;
+  for (std::uint32_t i = 0; i < edges_.size(); ++i) sum += evaluate_edge(i).squared_norm;
+  for (std::uint32_t i = 0; i < landmarks_.size(); ++i) {
+    const Eigen::Vector3d at = point(i);
+    for (const LandmarkView& view : landmarks_[i].views) {
+      const Rigid3d cam_from_world = pose(view.pose);
+      const double* blocks[] = {cam_from_world.params.data(), at.data()};
+      Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+      if (observation_factors_[view.observation]->Evaluate(blocks, residual.data(), nullptr)) {
+        sum += residual.squaredNorm();
+      }
+    }
+  }
+  return sum / 2;
+}
+
 void IncrementalSolver::evaluate(std::uint32_t id) {
   Term& term = terms_[id];
   if (term.kind == TermKind::kPrior) return;  // never off its linearisation

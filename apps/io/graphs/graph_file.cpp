@@ -5,6 +5,7 @@
 #include "apps/io/graphs/bal.h"
 #include "apps/io/graphs/colmap.h"
 #include "apps/io/graphs/g2o.h"
+#include "apps/io/graphs/map_graph.h"
 #include "apps/io/graphs/stereo_graph.h"
 #include "apps/io/graphs/stereo_stream.h"
 #include "apps/io/graphs/text_scanner.h"
@@ -23,6 +24,7 @@ bool is_whole_number(std::string_view field) {
 
 // The kind of a file from its first line.
 GraphFile read_graph_file(const fs::path& path) {
+  if (is_map_file(path) || path.extension() == ".hslam") return read_map_graph(path);
   TextScanner in(path);
   if (!in.more()) throw InputError(path.string() + ": is empty");
   const std::string first(in.field("first field"));
@@ -37,6 +39,15 @@ GraphFile read_graph_file(const fs::path& path) {
   if (is_stereo_factors(path)) return read_stereo_graph(path);
   if (whole_numbers && fields <= 3) return read_bal(path);
   in.fail(quote(first) + " begins no kind of graph that is known");
+}
+
+GraphFile read_any(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return read_graph_file(path);
+  for (const ColmapVariant variant : {ColmapVariant::kBinary, ColmapVariant::kText}) {
+    if (has_colmap_model(path, variant)) return read_colmap(path, variant);
+  }
+  return read_stereo_graph(path);
 }
 
 }  // namespace
@@ -55,17 +66,18 @@ std::string_view name_of(GraphFormat format) {
       return "stereo-graph";
     case GraphFormat::kStereoStream:
       return "stereo-stream";
+    case GraphFormat::kMap:
+      return "map";
+    case GraphFormat::kPly:
+      return "ply";
   }
   throw std::logic_error("no such graph format");
 }
 
 GraphFile read_graph(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return read_graph_file(path);
-  for (const ColmapVariant variant : {ColmapVariant::kBinary, ColmapVariant::kText}) {
-    if (has_colmap_model(path, variant)) return read_colmap(path, variant);
-  }
-  return read_stereo_graph(path);
+  GraphFile file = read_any(path);
+  if (auto writer = make_map_writer(file)) file.writers.push_back(std::move(*writer));
+  return file;
 }
 
 }  // namespace hybrid_slam

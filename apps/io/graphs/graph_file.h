@@ -4,20 +4,32 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "backend/map/map_snapshot.h"
 #include "backend/problem/factor_graph.h"
 #include "cameras/input_error.h"
 
 namespace hybrid_slam {
 
-enum class GraphFormat { kBal, kG2o, kColmapText, kColmapBinary, kStereoGraph, kStereoStream };
+enum class GraphFormat {
+  kBal,
+  kG2o,
+  kColmapText,
+  kColmapBinary,
+  kStereoGraph,
+  kStereoStream,
+  kMap,
+  kPly,  // written only
+};
 
-inline constexpr std::array<GraphFormat, 6> kGraphFormats{
+inline constexpr std::array<GraphFormat, 8> kGraphFormats{
     GraphFormat::kBal,          GraphFormat::kG2o,         GraphFormat::kColmapText,
-    GraphFormat::kColmapBinary, GraphFormat::kStereoGraph, GraphFormat::kStereoStream};
+    GraphFormat::kColmapBinary, GraphFormat::kStereoGraph, GraphFormat::kStereoStream,
+    GraphFormat::kMap,          GraphFormat::kPly};
 
 std::string_view name_of(GraphFormat format);  // "bal", "g2o", "colmap-text", ...
 
@@ -41,7 +53,8 @@ struct GraphFile {
   std::vector<double> times;                   // [s], ascending
   std::vector<Rigid3d> previous_from_current;  // odometry; the first is the identity
   std::vector<Rigid3d> true_cam_from_world;
-  std::vector<std::string> warnings;  // what could be worked around
+  std::shared_ptr<const MapSnapshot> map;  // of a map file, as it was read; else null
+  std::vector<std::string> warnings;       // what could be worked around
   // For graphs whose items are this graph's, moved: all but the estimate comes from the file that
   // was read. The first writes the format that was read.
   std::vector<GraphWriter> writers;
