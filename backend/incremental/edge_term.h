@@ -6,7 +6,7 @@
 
 namespace hybrid_slam {
 
-// An edge between two poses, linearised in their chart coordinates:
+// An edge between two poses, linearised; delta_a and delta_b sum up their increments:
 //   r = residual + by_a * delta_a + by_b * delta_b.
 struct EdgeTerm {
   std::uint32_t poses[2] = {0, 0};  // those that vary come first

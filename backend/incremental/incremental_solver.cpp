@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "backend/incremental/chart.h"
 #include "backend/problem/measurement_fault.h"
 #include "factors/make_reprojection_factor.h"
 #include "factors/relative_pose_factor.h"
@@ -79,7 +78,12 @@ std::uint32_t IncrementalSolver::add_camera(const Camera& camera) {
 std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
   refuse(frame.cam_from_world.params.allFinite() ? nullptr : "not finite", "pose");
   const auto index = static_cast<std::uint32_t>(poses_.size());
-  poses_.push_back({frame.cam_from_world, frame.camera, frame.fixed, {}});
+  Pose pose;
+  pose.tangent.place = inverse(frame.cam_from_world).translation();
+  pose.folded = frame.cam_from_world;
+  pose.camera = frame.camera;
+  pose.fixed = frame.fixed;
+  poses_.push_back(std::move(pose));
   tree_.resize(poses_.size());
   if (!frame.fixed) newest_.push_back(index);
   return index;
@@ -89,7 +93,15 @@ std::uint32_t IncrementalSolver::add_point(const Eigen::Vector3d& in_world) {
   refuse(in_world.allFinite() ? nullptr : "not finite", "point");
   LandmarkTerm landmark;
   landmark.base = in_world;
+  if (!free_points_.empty()) {
+    const std::uint32_t index = free_points_.back();
+    free_points_.pop_back();
+    landmarks_[index] = std::move(landmark);
+    point_there_[index] = 1;
+    return index;
+  }
   landmarks_.push_back(std::move(landmark));
+  point_there_.push_back(1);
   landmark_terms_.push_back(
       add_term(TermKind::kLandmark, static_cast<std::uint32_t>(landmarks_.size()) - 1));
   return static_cast<std::uint32_t>(landmarks_.size()) - 1;
@@ -106,6 +118,7 @@ std::uint32_t IncrementalSolver::add_term(TermKind kind, std::uint32_t index) {
 std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observation) {
   Pose& pose = item(poses_, observation.frame, "pose");
   LandmarkTerm& landmark = item(landmarks_, observation.point, "point");
+  refuse(point_there_[observation.point] != 0 ? nullptr : "was removed", "point");
   const Camera& camera = item(cameras_, pose.camera, "camera");
   refuse(measurement_fault(observation, camera), "observation");
   const std::uint32_t index = free_observation();
@@ -177,6 +190,14 @@ void IncrementalSolver::remove_observation(std::uint32_t observation) {
   }
 }
 
+void IncrementalSolver::remove_point(std::uint32_t point) {
+  const LandmarkTerm& landmark = item(landmarks_, point, "point");
+  if (point_there_[point] == 0) return;
+  point_there_[point] = 0;
+  while (!landmark.views.empty()) remove_observation(landmark.views.back().observation);
+  free_points_.push_back(point);
+}
+
 void IncrementalSolver::remove_edge(std::uint32_t edge) {
   if (item(edge_there_, edge, "edge") == 0) return;
   edge_there_[edge] = 0;
@@ -225,16 +246,45 @@ Vector6d IncrementalSolver::delta(std::uint32_t pose) const {
 }
 
 Matrix6d IncrementalSolver::covariance(std::uint32_t pose) const {
-  return poses_.at(pose).fixed ? Matrix6d::Zero() : tree_.covariance(pose);
+  if (poses_.at(pose).fixed) return Matrix6d::Zero();
+  // The left perturbation that an increment is.
+  const Matrix6d left = poses_[pose].tangent.from_left(Matrix6d::Identity(), this->pose(pose));
+  return left * tree_.covariance(pose) * left.transpose();
 }
 
 Rigid3d IncrementalSolver::pose(std::uint32_t index) const {
   const Pose& pose = poses_.at(index);
-  return pose.fixed ? pose.base : chart_pose(pose.base, tree_.delta(index));
+  if (pose.fixed) return pose.folded;
+  return pose.tangent.moved(pose.folded, tree_.delta(index) - pose.folded_delta);
 }
 
 Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
-  return landmarks_.at(index).solve([this](std::uint32_t pose) { return tree_.delta(pose); });
+  const LandmarkTerm& landmark = landmarks_.at(index);
+  Eigen::Vector3d at = carried_base(landmark);
+  if (!landmark.solvable) return at;
+  at += displacement(landmark);
+  if (landmark.anchor != LandmarkTerm::kNoAnchor) {
+    at -= poses_[landmark.anchor].tangent.carried(
+        landmark.base, tree_.delta(landmark.anchor) - landmark.anchor_delta);
+  }
+  return at;
+}
+
+Eigen::Vector3d IncrementalSolver::displacement(const LandmarkTerm& landmark) const {
+  return landmark.displacement([this](std::uint32_t pose) { return tree_.delta(pose); });
+}
+
+// Where its anchor's motion, in full, took the point since it was linearised.
+Eigen::Vector3d IncrementalSolver::carried_base(const LandmarkTerm& landmark) const {
+  if (landmark.anchor == LandmarkTerm::kNoAnchor) return landmark.base;
+  return inverse(pose(landmark.anchor)) * landmark.in_anchor;
+}
+
+// Makes the pose's increments since the last time part of its estimate. Increments are composed one
+// by one, since only so poses that share them stay rigid.
+void IncrementalSolver::fold(std::uint32_t index) {
+  poses_[index].folded = pose(index);
+  poses_[index].folded_delta = tree_.delta(index);
 }
 
 // Measures anew how far these terms and those of these poses are from their linearisation.
@@ -338,12 +388,15 @@ UpdateSummary IncrementalSolver::update() {
     summary.multiplications += tree_.last_cost();
     moved.clear();
     tree_.solve(options_.wildfire, moved);
-    summary.moved = std::max(summary.moved, moved.size());
+    for (const std::uint32_t pose : moved) fold(pose);
+    summary.moved.insert(summary.moved.end(), moved.begin(), moved.end());
     check(linearized, moved);
     if (step + 1 < options_.max_steps) summary.relinearized += choose();
   }
   newest_.clear();
-  slide_window();
+  std::sort(summary.moved.begin(), summary.moved.end());
+  summary.moved.erase(std::unique(summary.moved.begin(), summary.moved.end()), summary.moved.end());
+  summary.marginalized = slide_window();
   summary.pending = pending_.size();
   return summary;
 }
@@ -364,7 +417,13 @@ FactorGraph IncrementalSolver::graph() const {
   for (const PriorTerm& prior : priors_) {
     if (prior.poses.empty()) continue;
     GraphPrior made{prior.poses, {}, prior.rows.jacobian, prior.rows.residual};
-    for (const std::uint32_t i : prior.poses) made.bases.push_back(poses_[i].base);
+    for (std::size_t k = 0; k < prior.poses.size(); ++k) {
+      const std::uint32_t i = prior.poses[k];
+      auto by_pose = made.jacobian.middleCols<6>(static_cast<Eigen::Index>(6 * k));
+      made.bases.push_back(pose(i));
+      made.residual += by_pose * delta(i);
+      by_pose = poses_[i].tangent.to_origin(by_pose);
+    }
     graph.priors.push_back(std::move(made));
   }
   return graph;

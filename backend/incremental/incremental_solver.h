@@ -7,6 +7,7 @@
 #include "backend/incremental/landmark_term.h"
 #include "backend/incremental/pose_tree.h"
 #include "backend/incremental/prior_term.h"
+#include "backend/incremental/world_tangent.h"
 #include "backend/problem/factor_graph.h"
 #include "backend/problem/problem_config.h"
 
@@ -23,13 +24,13 @@ struct IncrementalOptions {
   // (root mean square over all rows).
   double relinearization = 1e-4;
   double worst_mismatch = 0.5;
-  // Back-substitution stops where a pose's tangent (metres, radians) changes by less.
+  // Back-substitution stops where a pose moves by less (metres, radians).
   double wildfire = 1e-5;
   int max_steps = 3;  // Gauss-Newton steps per update
   // Multiplications that relinearising old terms may cost per update, on average; what was not
   // spent is saved up for later ones, up to `burst` times as much. The rest waits its turn.
-  double budget = 1e7;
-  double burst = 6;
+  double budget = 5e6;
+  double burst = 3;
   Loss loss = Loss::kNone;  // of observations, at the square root of the threshold
   double chi2_mono = 5.991;
   double chi2_stereo = 7.815;
@@ -43,11 +44,12 @@ struct IncrementalOptions {
 
 struct UpdateSummary {
   int steps = 0;
-  std::size_t poses = 0;         // factored anew, over all steps
-  std::size_t relinearized = 0;  // terms
-  std::size_t pending = 0;       // terms that wait to be linearised anew
-  std::size_t moved = 0;         // poses whose estimate changed
-  double multiplications = 0;    // of the factorisation
+  std::size_t poses = 0;                    // factored anew, over all steps
+  std::size_t relinearized = 0;             // terms
+  std::size_t pending = 0;                  // terms that wait to be linearised anew
+  std::vector<std::uint32_t> moved;         // poses whose estimate changed, ascending
+  std::vector<std::uint32_t> marginalized;  // poses that no longer move, from now on; ascending
+  double multiplications = 0;               // of the factorisation
 };
 
 // Incremental smoothing of a graph that grows: see docs/backend.md. The graph persists: each term
@@ -59,9 +61,9 @@ class IncrementalSolver final : private TermSource {
   explicit IncrementalSolver(const IncrementalOptions& options);
   ~IncrementalSolver() override;
 
-  // All return the index of what they add, counted from 0 per kind; that of an observation which
-  // was removed or marginalised is used again. They throw std::logic_error and add nothing if an
-  // index is out of range or a number cannot be used.
+  // All return the index of what they add, counted from 0 per kind; that of a point or observation
+  // which was removed, and of an observation that was marginalised, is used again. They throw
+  // std::logic_error and add nothing if an index is out of range or a number cannot be used.
   std::uint32_t add_camera(const Camera& camera);
   std::uint32_t add_pose(const GraphFrame& frame);
   std::uint32_t add_point(const Eigen::Vector3d& in_world);
@@ -69,9 +71,10 @@ class IncrementalSolver final : private TermSource {
   std::uint32_t add_edge(const GraphEdge& edge);
   void remove_observation(std::uint32_t observation);
   void remove_edge(std::uint32_t edge);
+  void remove_point(std::uint32_t point);  // with its observations
 
-  // The covariance of a pose's perturbation in the frame of the world (chart.h), given all that was
-  // taken in; conditional on what is fixed.
+  // The covariance of a pose's left perturbation, exp(d) * cam_from_world, given all that was taken
+  // in; conditional on what is fixed.
   Matrix6d covariance(std::uint32_t pose) const;
 
   // Takes in what was added and removed since the last update.
@@ -80,6 +83,10 @@ class IncrementalSolver final : private TermSource {
   Rigid3d pose(std::uint32_t index) const;
   Eigen::Vector3d point(std::uint32_t index) const;
   std::size_t pose_count() const { return poses_.size(); }
+
+  // Squared whitened residual of an observation that is there, at the present estimate; infinite if
+  // the point does not project.
+  double chi2(std::uint32_t observation) const;
 
   // The terms that are there, at the present estimate: for a batch solver.
   FactorGraph graph() const;
@@ -103,7 +110,9 @@ class IncrementalSolver final : private TermSource {
   };
 
   struct Pose {
-    Rigid3d base;  // its estimate is chart_pose(base, delta)
+    WorldTangent tangent;
+    Rigid3d folded;  // the estimate when its delta was folded_delta
+    Vector6d folded_delta = Vector6d::Zero();
     std::uint32_t camera = GraphFrame::kNoCamera;
     bool fixed = false;
     std::vector<std::uint32_t> terms;
@@ -137,8 +146,11 @@ class IncrementalSolver final : private TermSource {
   void marginalize_poses(const std::vector<std::uint32_t>& poses);
   void add_prior(PriorTerm prior);
   void drop_term(std::uint32_t term);
-  void slide_window();
+  std::vector<std::uint32_t> slide_window();
   Vector6d delta(std::uint32_t pose) const;
+  void fold(std::uint32_t pose);
+  Eigen::Vector3d displacement(const LandmarkTerm& landmark) const;
+  Eigen::Vector3d carried_base(const LandmarkTerm& landmark) const;
 
   IncrementalOptions options_;
   PoseTree tree_;
@@ -149,6 +161,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<char> observation_there_;
   std::vector<std::unique_ptr<ceres::CostFunction>> observation_factors_;
   std::vector<LandmarkTerm> landmarks_;
+  std::vector<char> point_there_;
   std::vector<std::uint32_t> landmark_terms_;  // the term of a landmark
   std::vector<GraphEdge> edges_;
   std::vector<char> edge_there_;
@@ -157,11 +170,12 @@ class IncrementalSolver final : private TermSource {
   std::vector<std::uint32_t> edge_ids_;  // the term of an edge
   std::vector<PriorTerm> priors_;
   std::vector<std::uint32_t> free_observations_;  // indices that may be used again
-  std::uint32_t oldest_ = 0;                      // poses before it do not vary
-  std::vector<std::uint32_t> dirty_;              // terms
-  std::vector<std::uint32_t> touched_;            // poses whose terms changed
-  std::vector<std::uint32_t> newest_;             // poses
-  std::vector<std::uint32_t> pending_;            // terms
+  std::vector<std::uint32_t> free_points_;
+  std::uint32_t oldest_ = 0;            // poses before it do not vary
+  std::vector<std::uint32_t> dirty_;    // terms
+  std::vector<std::uint32_t> touched_;  // poses whose terms changed
+  std::vector<std::uint32_t> newest_;   // poses
+  std::vector<std::uint32_t> pending_;  // terms
   std::uint64_t stamp_ = 0;
   double squared_norm_ = 0;  // of all terms
   double rows_ = 0;

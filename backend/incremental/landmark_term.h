@@ -11,9 +11,9 @@ namespace hybrid_slam {
 
 class Front;
 
-// One observation of a landmark, linearised: with delta the chart coordinates of its pose
-// (backend/incremental/chart.h) and p the landmark,
-//   r = residual + by_pose * delta + by_point * (p - base)
+// One observation of a landmark, linearised: with delta the sum of its pose's increments
+// (backend/incremental/world_tangent.h) and d the displacement of the landmark,
+//   r = residual + by_pose * delta + by_point * d
 // in standard deviations. Two-row measurements leave the third row zero.
 struct LandmarkView {
   std::uint32_t observation = 0;
@@ -32,7 +32,13 @@ struct LandmarkView {
 // a term on the poses that see it,
 //   H(i, j) = [i = j] by_pose_i^T by_pose_i - reduced_i reduced_j^T.
 struct LandmarkTerm {
+  static constexpr std::uint32_t kNoAnchor = static_cast<std::uint32_t>(-1);
+
   Eigen::Vector3d base = Eigen::Vector3d::Zero();  // where it was linearised
+  // A pose that carries the point along: the linear solution leaves out how that turns it since.
+  std::uint32_t anchor = kNoAnchor;
+  Eigen::Vector3d in_anchor = Eigen::Vector3d::Zero();  // base, in the anchor's frame
+  Vector6d anchor_delta = Vector6d::Zero();             // when it was linearised
   std::vector<LandmarkView> views;
   std::vector<std::uint32_t> poses;                       // that vary, of the views, in their order
   Eigen::Matrix3d factor = Eigen::Matrix3d::Identity();   // L, with L L^T = sum by_point^T by_point
@@ -42,17 +48,17 @@ struct LandmarkTerm {
   // From the views' derivatives: factor, half_solved, reduced, solvable.
   void eliminate();
 
-  // The point that minimises the term; delta_of(pose) gives a pose's chart coordinates.
+  // The displacement from `base` that minimises the term; delta_of(pose) gives a pose's delta.
   template <typename DeltaOf>
-  Eigen::Vector3d solve(const DeltaOf& delta_of) const {
-    if (!solvable) return base;
+  Eigen::Vector3d displacement(const DeltaOf& delta_of) const {
+    if (!solvable) return Eigen::Vector3d::Zero();
     Eigen::Vector3d right = half_solved;
     for (const LandmarkView& view : views) {
       if (view.usable && !view.fixed) {
         right.noalias() += view.reduced.transpose() * delta_of(view.pose);
       }
     }
-    return base - factor.transpose().triangularView<Eigen::Upper>().solve(right);
+    return -factor.transpose().triangularView<Eigen::Upper>().solve(right);
   }
 
   void assemble(Front& front) const;

@@ -1,8 +1,9 @@
 #include <ceres/cost_function.h>
 
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 
-#include "backend/incremental/chart.h"
 #include "backend/incremental/incremental_solver.h"
 
 // What an IncrementalSolver asks its terms: their linearisation at the present estimate, and how
@@ -46,7 +47,7 @@ void IncrementalSolver::linearize_edge(std::uint32_t index) {
     if (poses_[pose].fixed) continue;
     const Vector6d& at = tree_.delta(pose);
     const Matrix6d by_left = Eigen::Map<const RowMajor67>(jacobian).leftCols<6>();
-    term.by_pose[k] = by_chart<6>(by_left, poses_[pose].base, at);
+    term.by_pose[k] = poses_[pose].tangent.from_left(by_left, pose == edge.a ? a : b);
     term.residual.noalias() -= term.by_pose[k] * at;
     ++k;
   }
@@ -78,17 +79,17 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
   view.residual *= weight;
   view.by_point = weight * by_point;
   if (!view.fixed) {
-    const Vector6d& at = tree_.delta(view.pose);
     const Eigen::Matrix<double, 3, 6> by_left = weight * by_pose.leftCols<6>();
-    view.by_pose = by_chart<3>(by_left, poses_[view.pose].base, at);
-    view.residual.noalias() -= view.by_pose * at;
+    view.by_pose = poses_[view.pose].tangent.from_left(by_left, cam_from_world);
+    view.residual.noalias() -= view.by_pose * tree_.delta(view.pose);
   }
   return true;
 }
 
 void IncrementalSolver::linearize_landmark(std::uint32_t index) {
   LandmarkTerm& landmark = landmarks_[index];
-  Eigen::Vector3d step = point(index) - landmark.base;
+  const Eigen::Vector3d start = carried_base(landmark);
+  Eigen::Vector3d step = point(index) - start;
   if (!step.allFinite()) step.setZero();
   std::vector<LandmarkView> views = landmark.views;
   const auto linearize_at = [&](const Eigen::Vector3d& at) {
@@ -100,17 +101,23 @@ void IncrementalSolver::linearize_landmark(std::uint32_t index) {
     return all;
   };
   // A step that takes the point out of a view which had it is too long.
-  bool fits = linearize_at(landmark.base + step);
+  bool fits = linearize_at(start + step);
   for (int i = 0; i < kHalvings && !fits; ++i) {
     step *= 0.5;
-    fits = linearize_at(landmark.base + step);
+    fits = linearize_at(start + step);
   }
   if (!fits) {
     step.setZero();
-    linearize_at(landmark.base);
+    linearize_at(start);
   }
-  landmark.base += step;
+  landmark.base = start + step;
   landmark.views = std::move(views);
+  landmark.anchor = LandmarkTerm::kNoAnchor;
+  if (!landmark.poses.empty()) {
+    landmark.anchor = landmark.poses.front();
+    landmark.in_anchor = pose(landmark.anchor) * landmark.base;
+    landmark.anchor_delta = tree_.delta(landmark.anchor);
+  }
   landmark.eliminate();
 }
 
@@ -134,11 +141,12 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
   const LandmarkTerm& landmark = landmarks_[index];
   Evaluation result;
   if (!landmark.solvable) return result;
-  const Eigen::Vector3d moved = point(index);
+  const Eigen::Vector3d at = point(index);
+  const Eigen::Vector3d by_point = displacement(landmark);
   for (const LandmarkView& view : landmark.views) {
     if (!view.usable) continue;
     const Rigid3d cam_from_world = pose(view.pose);
-    const double* blocks[] = {cam_from_world.params.data(), moved.data()};
+    const double* blocks[] = {cam_from_world.params.data(), at.data()};
     const ceres::CostFunction& factor = *observation_factors_[view.observation];
     Eigen::Vector3d residual = Eigen::Vector3d::Zero();
     result.rows += factor.num_residuals();
@@ -147,11 +155,27 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
       continue;
     }
     result.squared_norm += residual.squaredNorm();
-    residual = view.weight * residual - view.residual - view.by_point * (moved - landmark.base);
+    residual = view.weight * residual - view.residual - view.by_point * by_point;
     if (!view.fixed) residual.noalias() -= view.by_pose * tree_.delta(view.pose);
     result.squared_mismatch += residual.squaredNorm();
   }
   return result;
+}
+
+double IncrementalSolver::chi2(std::uint32_t observation) const {
+  if (observation_there_.at(observation) == 0) {
+    throw std::logic_error("IncrementalSolver::chi2: no such observation");
+  }
+  const GraphObservation& seen = observations_[observation];
+  const ceres::CostFunction& factor = *observation_factors_[observation];
+  const Rigid3d cam_from_world = pose(seen.frame);
+  const Eigen::Vector3d at = point(seen.point);
+  const double* blocks[] = {cam_from_world.params.data(), at.data()};
+  Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+  if (!factor.Evaluate(blocks, residual.data(), nullptr)) {
+    return std::numeric_limits<double>::infinity();
+  }
+  return residual.squaredNorm();
 }
 
 double IncrementalSolver::cost() const {

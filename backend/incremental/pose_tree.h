@@ -44,12 +44,6 @@ class PoseTree {
 
   const Vector6d& delta(std::uint32_t pose) const { return delta_[pose]; }
 
-  // The pose's tangent now starts at its present estimate. Its terms must be touched next.
-  void reset_delta(std::uint32_t pose) {
-    delta_[pose].setZero();
-    sent_[pose].setZero();
-  }
-
   // Of a pose's delta: its block of H^-1. Looks at the pose's clique and those above.
   Matrix6d covariance(std::uint32_t pose) const;
 

@@ -8,8 +8,7 @@
 
 namespace hybrid_slam {
 
-// What marginalised poses left on others: rows over the chart coordinates of `poses`, in their
-// order.
+// What marginalised poses left on others: rows over the deltas of `poses`, in their order.
 struct PriorTerm {
   std::vector<std::uint32_t> poses;
   LinearSystem rows;

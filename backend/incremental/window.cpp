@@ -112,7 +112,7 @@ void IncrementalSolver::marginalize_poses(const std::vector<std::uint32_t>& pose
   prior.rows = marginalize(all, static_cast<Eigen::Index>(6 * poses.size()));
   for (const std::uint32_t id : ids) drop_term(id);
   for (const std::uint32_t pose : poses) {
-    poses_[pose].base = this->pose(pose);
+    fold(pose);
     poses_[pose].fixed = true;
   }
   if (prior.rows.residual.size() > 0) add_prior(std::move(prior));
@@ -159,7 +159,8 @@ void IncrementalSolver::drop_term(std::uint32_t id) {
   }
 }
 
-void IncrementalSolver::slide_window() {
+// Returns the poses that left.
+std::vector<std::uint32_t> IncrementalSolver::slide_window() {
   const auto window = static_cast<std::size_t>(options_.window);
   // Several at once: what they see together is taken apart once.
   const std::size_t slack = std::max<std::size_t>(1, window / 10);
@@ -167,10 +168,11 @@ void IncrementalSolver::slide_window() {
   for (std::uint32_t i = oldest_; i < poses_.size(); ++i) {
     if (!poses_[i].fixed) active.push_back(i);
   }
-  if (window == 0 || active.size() < window + slack) return;
+  if (window == 0 || active.size() < window + slack) return {};
   active.resize(active.size() - window);
   marginalize_poses(active);
   oldest_ = active.back() + 1;
+  return active;
 }
 
 }  // namespace hybrid_slam

@@ -177,7 +177,7 @@ TEST_CASE("A window loses nothing of a nearly linear graph") {
 
 // Normalised error of a pose's estimate, chi2 of 6 degrees of freedom if its covariance is right.
 double normalized_error(const IncrementalSolver& solver, std::uint32_t pose, const Rigid3d& truth) {
-  const Vector6d error = se3_log(inverse(solver.pose(pose)) * truth);
+  const Vector6d error = se3_log(truth * inverse(solver.pose(pose)));
   return error.dot(solver.covariance(pose).ldlt().solve(error));
 }
 
