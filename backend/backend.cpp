@@ -8,7 +8,8 @@ namespace hybrid_slam {
 
 namespace {
 
-void require_valid(const ProblemOptions& options, const char* name) {
+template <typename Options>
+void require_valid(const Options& options, const char* name) {
   if (const std::string wrong = options.validate(); !wrong.empty()) {
     throw std::invalid_argument(std::string("BackendOptions: ") + name + ": " + wrong);
   }
@@ -18,6 +19,7 @@ void require_valid(const ProblemOptions& options, const char* name) {
 
 Backend::Backend(const BackendOptions& options) : options_(options) {
   require_valid(options.local.problem, "local bundle");
+  require_valid(options.incremental, "incremental");
   require_valid(options.full.problem, "full bundle");
 }
 
@@ -29,16 +31,20 @@ void Backend::apply(const MapEdit& edit) { map_.apply(edit); }
 
 void Backend::set_keep(KeyframeId id) { map_.set_keep(id); }
 
-BundleSummary Backend::optimize_local(KeyframeId around, std::stop_token stop) {
-  return optimize(make_local_bundle(map_.view(), around, options_.local), stop);
+BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
+  if (options_.local_method == LocalMethod::kBundle) {
+    return take_in(solve_bundle(view(), make_local_bundle(view(), newest, options_.local), stop));
+  }
+  if (!smoother_) smoother_.emplace(options_.incremental);
+  return take_in(smoother_->update(snapshot(), newest));
 }
 
 BundleSummary Backend::optimize_full(std::stop_token stop) {
-  return optimize(make_full_bundle(map_.view(), options_.full), stop);
+  smoother_.reset();
+  return take_in(solve_bundle(view(), make_full_bundle(view(), options_.full), stop));
 }
 
-BundleSummary Backend::optimize(const ProblemConfig& config, const std::stop_token& stop) {
-  BundleResult result = solve_bundle(map_.view(), config, stop);
+BundleSummary Backend::take_in(BundleResult result) {
   for (const auto& [id, camera] : result.cameras) map_.set_camera(id, camera);
   map_.move(result.cam_from_world, result.point_in_world);
   MapEdit edit;

@@ -1,16 +1,26 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stop_token>
 
+#include "backend/incremental/map_smoother.h"
 #include "backend/map/map.h"
 #include "backend/problem/full_bundle.h"
 #include "backend/problem/local_bundle.h"
 
 namespace hybrid_slam {
 
+// What improves the map after each new keyframe.
+enum class LocalMethod {
+  kIncremental,  // incremental smoothing of the whole graph
+  kBundle,       // bundle adjustment of the keyframe's surroundings
+};
+
 struct BackendOptions {
+  LocalMethod local_method = LocalMethod::kIncremental;
   LocalBundleOptions local;
+  MapSmootherOptions incremental;
   FullBundleOptions full;
 };
 
@@ -26,9 +36,10 @@ class Backend {
   void apply(const MapEdit& edit);
   void set_keep(KeyframeId id);  // exempt from culling
 
-  // Local bundle adjustment around a keyframe; outlier observations are erased from the map.
-  // Between iterations it looks at `stop` and keeps what it has when stopped.
-  BundleSummary optimize_local(KeyframeId around, std::stop_token stop = {});
+  // Improves the map after the newest keyframe was added, by the method of the options; outlier
+  // observations are erased from the map. Bundle adjustment looks at `stop` between iterations and
+  // keeps what it has when stopped; an incremental update is short.
+  BundleSummary optimize_local(KeyframeId newest, std::stop_token stop = {});
 
   // Bundle adjustment of everything but the origin.
   BundleSummary optimize_full(std::stop_token stop = {});
@@ -38,10 +49,11 @@ class Backend {
   const Map& map() const { return map_; }
 
  private:
-  BundleSummary optimize(const ProblemConfig& config, const std::stop_token& stop);
+  BundleSummary take_in(BundleResult result);
 
   BackendOptions options_;
   Map map_;
+  std::optional<MapSmoother> smoother_;  // in step with the map; none if that was moved since
 };
 
 }  // namespace hybrid_slam

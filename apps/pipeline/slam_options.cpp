@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "cameras/yaml_section.h"
 
@@ -22,6 +23,23 @@ class Section {
     known_.insert(key);
     if (yaml_ && yaml_->has(key)) value = yaml_->value<T>(key);
     return *this;
+  }
+
+  // One of several words.
+  template <typename T>
+  Section& choice(const char* key, const std::vector<std::pair<std::string, T>>& words, T& value) {
+    known_.insert(key);
+    if (!yaml_ || !yaml_->has(key)) return *this;
+    const std::string wanted = yaml_->text(key);
+    std::string list;
+    for (const auto& [word, meaning] : words) {
+      if (word == wanted) {
+        value = meaning;
+        return *this;
+      }
+      list += (list.empty() ? "" : ", ") + word;
+    }
+    yaml_->fail(key, "is none of " + list);
   }
 
   Section section(const char* key) {
@@ -46,6 +64,15 @@ class WrittenSection {
   template <typename T>
   WrittenSection& field(const char* key, const T& value) {
     node_[key] = value;
+    return *this;
+  }
+
+  template <typename T>
+  WrittenSection& choice(const char* key, const std::vector<std::pair<std::string, T>>& words,
+                         const T& value) {
+    for (const auto& [word, meaning] : words) {
+      if (meaning == value) node_[key] = word;
+    }
     return *this;
   }
 
@@ -191,6 +218,17 @@ void fields_of(S section, CullingOptions& options) {
 }
 
 template <typename S>
+void fields_of(S section, BackendOptions& options) {
+  section
+      .choice("method",
+              {{"incremental", LocalMethod::kIncremental}, {"bundle", LocalMethod::kBundle}},
+              options.local_method)
+      .field("window", options.incremental.solver.window)
+      .field("budget", options.incremental.solver.budget)
+      .refuse_unknown();
+}
+
+template <typename S>
 void fields_of(S top, SlamOptions& options) {
   fields_of(top.section("sift"), options.sift);
   fields_of(top.section("stereo"), options.stereo);
@@ -198,6 +236,7 @@ void fields_of(S top, SlamOptions& options) {
   fields_of(top.section("triangulation"), options.triangulation);
   fields_of(top.section("fusion"), options.fusion);
   fields_of(top.section("culling"), options.culling);
+  fields_of(top.section("backend"), options.backend);
   top.field("features", options.features).field("seed", options.seed).refuse_unknown();
 }
 
@@ -216,7 +255,7 @@ std::string SlamOptions::validate() const {
   }
   for (const std::string& error :
        {sift.validate(), stereo.validate(), tracking.validate(), triangulation.validate(),
-        fusion.validate(), culling.validate()}) {
+        fusion.validate(), culling.validate(), backend.incremental.validate()}) {
     if (!error.empty()) {
       return error;
     }

@@ -29,6 +29,10 @@ class MapSnapshot {
   std::vector<LandmarkId> landmark_ids() const;  // ascending
   KeyframeId origin() const;                     // invalid while the map is empty
 
+  // Landmarks that were born, changed or erased since an earlier snapshot of the same map; some may
+  // be as they were. Ascending. Costs what changed.
+  std::vector<LandmarkId> changed_landmarks(const MapSnapshot& since) const;
+
   // The keyframe made from a camera's frame; null if there is none, or it was erased. Keyframes
   // enter in the order of their frames, so recent ones are found at once.
   const Keyframe* find_frame(CameraId camera, std::int64_t frame_index) const;

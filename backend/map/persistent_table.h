@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -92,6 +93,14 @@ class PersistentTable {
     if (root_ != nullptr) visit(*root_, levels_, 0, f);
   }
 
+  // Calls f(index), ascending, where the values of this table and of one that was shared from it,
+  // or it from that, may differ. Skips what the two still share.
+  template <typename F>
+  void for_each_change(const PersistentTable& other, F&& f) const {
+    const unsigned level = std::max(levels_, other.levels_);
+    compare({root_.get(), levels_}, {other.root_.get(), other.levels_}, level, 0, f);
+  }
+
  private:
   static constexpr unsigned kBits = 5;
   static constexpr std::size_t kFanOut = std::size_t{1} << kBits;
@@ -159,6 +168,30 @@ class PersistentTable {
     const Inner& inner = static_cast<const Inner&>(node);
     for (std::size_t i = 0; i < kFanOut; ++i) {
       if (inner.child[i] != nullptr) visit(*inner.child[i], level - 1, (index << kBits) | i, f);
+    }
+  }
+
+  // A node, or null, and the level at which it stands: it covers the first indices of the levels
+  // above.
+  struct Place {
+    const Node* node;
+    unsigned level;
+
+    Place below(std::size_t i, unsigned from) const {
+      if (node == nullptr || level < from) return {i == 0 ? node : nullptr, level};
+      return {static_cast<const Inner*>(node)->child[i].get(), from - 1};
+    }
+  };
+
+  template <typename F>
+  static void compare(Place a, Place b, unsigned level, std::uint64_t index, F& f) {
+    if (a.node == b.node) return;
+    if (level == 0) {
+      f(index);
+      return;
+    }
+    for (std::size_t i = 0; i < kFanOut; ++i) {
+      compare(a.below(i, level), b.below(i, level), level - 1, (index << kBits) | i, f);
     }
   }
 

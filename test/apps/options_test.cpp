@@ -38,7 +38,7 @@ SlamOptions read_documented() {
 
 TEST_CASE("docs/options.md lists every key that is read, and no other") {
   const std::string source = read_text(SOURCE_FOLDER "/apps/pipeline/slam_options.cpp");
-  const auto read = count_words(source, "(?:field|section)\\(\"([a-z0-9_]+)\"");
+  const auto read = count_words(source, "(?:field|section|choice)\\(\"([a-z0-9_]+)\"");
   CHECK(read.size() > 40);
   CHECK(count_words(documented_options(), "(?:^|\\n) *([a-z0-9_]+):") == read);
 }
@@ -119,6 +119,9 @@ TEST_CASE("docs/options.md gives the defaults") {
   SAME(culling.redundant_share);
   SAME(culling.redundant_observers);
   SAME(culling.close_baselines);
+  SAME(backend.local_method);
+  SAME(backend.incremental.solver.window);
+  SAME(backend.incremental.solver.budget);
 #undef SAME
 }
 
@@ -129,6 +132,7 @@ TEST_CASE("written options are read again exactly, every key of them") {
   options.stereo.ratio = 1.0 / 3;
   options.sift.upsample = false;
   options.tracking.refinement.sigma = 0.1;
+  options.backend.local_method = LocalMethod::kBundle;
   const std::string text = write_slam_options(options);
   const TempFolder folder;
   write_text(folder.path() / "options.yaml", text);
@@ -137,6 +141,7 @@ TEST_CASE("written options are read again exactly, every key of them") {
   CHECK(read.seed == ~std::uint64_t{0});
   CHECK(read.stereo.ratio == 1.0 / 3);
   CHECK_FALSE(read.sift.upsample);
+  CHECK(read.backend.local_method == LocalMethod::kBundle);
   CHECK(write_slam_options(read) == text);
   const std::string keys = "(?:^|\\n) *([a-z0-9_]+):";
   CHECK(count_words(text, keys) == count_words(documented_options(), keys));

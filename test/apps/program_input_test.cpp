@@ -158,6 +158,10 @@ TEST_CASE("a configuration that cannot be used is refused with file, line and ke
     write_text(config, "sift:\n  upsample: perhaps\n");
     reason = "options.yaml:2: sift.upsample: must be true or false";
   }
+  SECTION("a word that is not among those to choose from") {
+    write_text(config, "backend:\n  method: magic\n");
+    reason = "options.yaml:2: backend.method: is none of incremental, bundle";
+  }
   SECTION("a value out of range") {
     write_text(config, "features: 3\n");
     reason = "options.yaml: features must lie between 50 and 100000";

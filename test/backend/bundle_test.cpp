@@ -183,8 +183,10 @@ TEST_CASE("Without an outer observer or the origin the oldest keyframe holds the
 TEST_CASE("The facade optimises its map, erases outliers, and repeats bit for bit") {
   const SyntheticScene scene =
       make_synthetic_scene({.times = 12, .landmarks = 800, .outlier_rate = 0.05, .seed = 4});
+  BackendOptions options;
+  options.local_method = GENERATE(LocalMethod::kBundle, LocalMethod::kIncremental);
   const auto run = [&] {
-    Backend backend({});
+    Backend backend(options);
     for (const Camera& camera : scene.cameras) backend.add_camera(camera);
     std::vector<LandmarkId> born(scene.points_in_world.size());
     for (const SyntheticFrame& frame : scene.frames) {

@@ -89,6 +89,32 @@ TEST_CASE("Shared tables go on independently, each as its own std::map") {
   }
 }
 
+std::vector<std::uint64_t> changes(const PersistentTable<int>& a, const PersistentTable<int>& b) {
+  std::vector<std::uint64_t> found;
+  a.for_each_change(b, [&](std::uint64_t index) { found.push_back(index); });
+  return found;
+}
+
+TEST_CASE("Two tables name what was edited since one was shared from the other, and no more") {
+  using Indices = std::vector<std::uint64_t>;
+  PersistentTable<int> table;
+  for (int i = 0; i < 900; ++i) table.insert(static_cast<std::uint64_t>(i), i);
+  const auto before = table.share();
+  CHECK(changes(table, before).empty());
+  table.edit(31) = -1;
+  table.edit(32) = -1;
+  table.erase(700);
+  table.insert(900, 0);
+  CHECK(changes(table, before) == Indices{31, 32, 700, 900});
+  CHECK(changes(before, table) == Indices{31, 32, 700, 900});
+  table.insert(40000, 0);  // the table grows by a level
+  CHECK(changes(table, before) == Indices{31, 32, 700, 900, 40000});
+  CHECK(changes(before, table) == Indices{31, 32, 700, 900, 40000});
+  const PersistentTable<int> none;
+  CHECK(changes(before, none).size() == 900);
+  CHECK(changes(none, before).size() == 900);
+}
+
 struct Counted {
   static inline int copies = 0;
   Counted() = default;

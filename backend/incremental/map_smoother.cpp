@@ -1,0 +1,151 @@
+#include "backend/incremental/map_smoother.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace hybrid_slam {
+
+std::string MapSmootherOptions::validate() const {
+  if (!(min_motion >= 0)) return "min_motion must not be negative";
+  return solver.validate();
+}
+
+MapSmoother::MapSmoother(const MapSmootherOptions& options)
+    : options_(options), solver_(options.solver) {}
+
+BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest) {
+  const auto start = std::chrono::steady_clock::now();
+  take_in_keyframes(*map, newest);
+  const std::vector<LandmarkId> changed =
+      known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
+  for (const LandmarkId id : changed) take_in_landmark(*map, id);
+  const UpdateSummary updated = solver_.update();
+
+  forget_marginalized(*map, updated.marginalized);
+  BundleResult result;
+  set_outliers_aside(*map, newest, result);
+  write_estimate(*map, updated.moved, newest, result);
+  known_map_ = std::move(map);
+  BundleSummary& summary = result.summary;
+  summary.end = updated.pending == 0 ? SolveEnd::kConverged : SolveEnd::kIterationLimit;
+  summary.text = std::to_string(updated.pending) + " terms wait to be linearised anew";
+  summary.iterations = updated.steps;
+  summary.variable_poses = static_cast<int>(updated.poses);
+  summary.variable_landmarks = static_cast<int>(result.point_in_world.size());
+  summary.outliers = static_cast<int>(result.outliers.size());
+  summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+// All up to this one, in their order.
+void MapSmoother::take_in_keyframes(const MapSnapshot& map, KeyframeId last) {
+  while (camera_count_ < map.camera_count()) {
+    solver_.add_camera(map.camera(CameraId(static_cast<std::uint32_t>(camera_count_++))));
+  }
+  while (pose_of_.size() <= last.value) {
+    const KeyframeId id(static_cast<std::uint32_t>(pose_of_.size()));
+    const Keyframe* keyframe = map.find(id);
+    pose_of_.push_back(kNone);
+    if (keyframe == nullptr) continue;
+    pose_of_.back() = solver_.add_pose(
+        {keyframe->cam_from_world, keyframe->observations->camera.value, id == map.origin()});
+    keyframe_of_.push_back(id);
+  }
+}
+
+// Brings what the solver has of a landmark in line with the map.
+void MapSmoother::take_in_landmark(const MapSnapshot& map, LandmarkId id) {
+  const Landmark* landmark = map.find(id);
+  if (landmark == nullptr) {
+    const auto gone = landmarks_.find(id);
+    if (gone == landmarks_.end()) return;
+    solver_.remove_point(gone->second.point);
+    landmarks_.erase(gone);
+    return;
+  }
+  const auto [place, is_new] = landmarks_.try_emplace(id);
+  KnownLandmark& known = place->second;
+  if (is_new) known.point = solver_.add_point(landmark->point_in_world);
+  const std::vector<Observation>& wanted = landmark->observations;
+  std::erase_if(known.views, [&](const View& view) {
+    if (std::binary_search(wanted.begin(), wanted.end(), view.seen)) return false;
+    if (view.in_solver != kNone) solver_.remove_observation(view.in_solver);
+    return true;
+  });
+  for (const Observation& seen : wanted) {
+    if (std::none_of(known.views.begin(), known.views.end(),
+                     [&](const View& view) { return view.seen == seen; })) {
+      known.views.push_back({seen, add_observation(map, known.point, seen)});
+    }
+  }
+}
+
+std::uint32_t MapSmoother::add_observation(const MapSnapshot& map, std::uint32_t point,
+                                           const Observation& seen) {
+  take_in_keyframes(map, seen.keyframe);
+  const FrameObservations& frame = *map.at(seen.keyframe).observations;
+  const Keypoint& keypoint = frame.features.keypoints[seen.keypoint];
+  const double u_right =
+      frame.has_right(seen.keypoint) ? frame.u_right[seen.keypoint] : kNoRightMatch;
+  return solver_.add_observation(
+      {pose_of_[seen.keyframe.value], point, {keypoint.x, keypoint.y, u_right}, keypoint.sigma});
+}
+
+void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
+                                     BundleResult& result) {
+  const IncrementalOptions& options = options_.solver;
+  for (const LandmarkId id : map.at(newest).landmarks) {
+    const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
+    if (found == landmarks_.end()) continue;
+    for (View& view : found->second.views) {
+      if (view.in_solver == kNone) continue;
+      const bool stereo = map.at(view.seen.keyframe).observations->has_right(view.seen.keypoint);
+      if (solver_.chi2(view.in_solver) <= (stereo ? options.chi2_stereo : options.chi2_mono)) {
+        continue;
+      }
+      solver_.remove_observation(view.in_solver);
+      view.in_solver = kNone;
+      result.outliers.push_back({id, view.seen});
+    }
+  }
+}
+
+// The keyframes that moved, and the landmarks that they and the newest one see.
+void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
+                                 KeyframeId newest, BundleResult& result) const {
+  std::vector<LandmarkId> seen = map.at(newest).landmarks;
+  for (const std::uint32_t pose : moved) {
+    const Keyframe* keyframe = map.find(keyframe_of_[pose]);
+    if (keyframe == nullptr) continue;
+    const Rigid3d estimate = solver_.pose(pose);
+    const auto off = (estimate.params - keyframe->cam_from_world.params).lpNorm<Eigen::Infinity>();
+    if (off <= options_.min_motion) continue;
+    result.cam_from_world.emplace_back(keyframe->id, estimate);
+    seen.insert(seen.end(), keyframe->landmarks.begin(), keyframe->landmarks.end());
+  }
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  for (const LandmarkId id : seen) {
+    const auto found = landmarks_.find(id);
+    if (found == landmarks_.end()) continue;
+    const Eigen::Vector3d estimate = solver_.point(found->second.point);
+    if (estimate.allFinite()) result.point_in_world.emplace_back(id, estimate);
+  }
+}
+
+// The solver let go of these poses and of all observations of what they see.
+void MapSmoother::forget_marginalized(const MapSnapshot& map,
+                                      const std::vector<std::uint32_t>& poses) {
+  for (const std::uint32_t pose : poses) {
+    const Keyframe* keyframe = map.find(keyframe_of_[pose]);
+    if (keyframe == nullptr) continue;
+    for (const LandmarkId id : keyframe->landmarks) {
+      const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
+      if (found == landmarks_.end()) continue;
+      for (View& view : found->second.views) view.in_solver = kNone;
+    }
+  }
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "backend/incremental/incremental_solver.h"
+#include "backend/map/map_snapshot.h"
+
+namespace hybrid_slam {
+
+struct MapSmootherOptions {
+  IncrementalOptions solver;
+  // Poses of the map follow the estimate once they are off by more [m, rad].
+  double min_motion = 1e-5;
+
+  MapSmootherOptions() { solver.loss = Loss::kHuber; }
+  std::string validate() const;
+};
+
+// Incremental smoothing of a map that grows: an IncrementalSolver kept in step with it. Each update
+// takes in what changed in the map, whatever it was (keyframes and landmarks that came or went,
+// observations, merged landmarks), at the price of that change. All keyframes but the origin vary,
+// or those of the solver's window. Moving the map by other means asks for a new smoother.
+class MapSmoother {
+ public:
+  explicit MapSmoother(const MapSmootherOptions& options);
+
+  // The map as it is now, with `newest` in it. The result holds what moved, and as outliers the
+  // observations beyond their threshold of the landmarks that `newest` sees: they are out of the
+  // smoother's problem, and the map is to follow.
+  BundleResult update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest);
+
+  const IncrementalSolver& solver() const { return solver_; }
+
+ private:
+  static constexpr std::uint32_t kNone = static_cast<std::uint32_t>(-1);
+
+  // An observation of the map and its index in the solver; kNone once it was marginalised or set
+  // aside.
+  struct View {
+    Observation seen;
+    std::uint32_t in_solver = kNone;
+  };
+  struct KnownLandmark {
+    std::uint32_t point = kNone;
+    std::vector<View> views;
+  };
+
+  void take_in_keyframes(const MapSnapshot& map, KeyframeId last);
+  void take_in_landmark(const MapSnapshot& map, LandmarkId id);
+  std::uint32_t add_observation(const MapSnapshot& map, std::uint32_t point,
+                                const Observation& seen);
+  void set_outliers_aside(const MapSnapshot& map, KeyframeId newest, BundleResult& result);
+  void write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
+                      KeyframeId newest, BundleResult& result) const;
+  void forget_marginalized(const MapSnapshot& map, const std::vector<std::uint32_t>& poses);
+
+  MapSmootherOptions options_;
+  IncrementalSolver solver_;
+  std::shared_ptr<const MapSnapshot> known_map_;  // as of the last update
+  std::size_t camera_count_ = 0;
+  std::vector<std::uint32_t> pose_of_;   // by keyframe
+  std::vector<KeyframeId> keyframe_of_;  // by pose
+  std::unordered_map<LandmarkId, KnownLandmark> landmarks_;
+};
+
+}  // namespace hybrid_slam

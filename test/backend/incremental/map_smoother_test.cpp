@@ -1,0 +1,141 @@
+#include "backend/incremental/map_smoother.h"
+
+#include <algorithm>
+#include <tuple>
+#include <vector>
+
+#include "backend/backend.h"
+#include "backend/problem/solve_graph.h"
+#include "test/support/random_edits.h"
+
+#include <catch2/catch.hpp>
+
+namespace hybrid_slam {
+namespace {
+
+// What tells observations apart: the keypoint's place.
+using Place = std::tuple<double, double>;
+
+std::vector<Place> observed(const MapSnapshot& map) {
+  std::vector<Place> places;
+  for (const LandmarkId id : map.landmark_ids()) {
+    for (const Observation& seen : map.at(id).observations) {
+      const Keypoint& keypoint =
+          map.at(seen.keyframe).observations->features.keypoints[seen.keypoint];
+      places.emplace_back(keypoint.x, keypoint.y);
+    }
+  }
+  std::sort(places.begin(), places.end());
+  return places;
+}
+
+std::vector<Place> observed(const FactorGraph& graph) {
+  std::vector<Place> places;
+  for (const GraphObservation& seen : graph.observations) {
+    places.emplace_back(seen.measurement.x(), seen.measurement.y());
+  }
+  std::sort(places.begin(), places.end());
+  return places;
+}
+
+TEST_CASE("A smoother holds the observations that the map holds, after any edits") {
+  SyntheticSceneOptions options;
+  options.times = 12;
+  options.landmarks = 600;
+  options.fisheye = true;
+  FilledMap filled = fill_map(make_synthetic_scene(options), {});
+  RandomEdits edits(filled, 5);
+  MapSmootherOptions lenient;  // only what does not project is an outlier
+  lenient.solver.chi2_mono = lenient.solver.chi2_stereo = 1e300;
+  MapSmoother smoother(lenient);
+  const KeyframeId newest = filled.keyframes.back();
+  filled.map.set_keep(newest);
+  for (int i = 0; i < 40; ++i) {
+    BundleResult result;
+    do {
+      result = smoother.update(filled.map.snapshot(), newest);
+      MapEdit outliers;
+      outliers.erased_observations = result.outliers;
+      filled.map.apply(outliers);
+    } while (!result.outliers.empty());
+    CHECK((observed(smoother.solver().graph()) == observed(filled.map.view())));
+    for (int k = 0; k < 10; ++k) edits.step();
+  }
+}
+
+// Grows a map as the pipeline does, from poses and points that are off.
+std::vector<Rigid3d> grow(const SyntheticScene& scene, Backend& backend, double pose_noise) {
+  Random random(3);
+  for (const Camera& camera : scene.cameras) backend.add_camera(camera);
+  std::vector<LandmarkId> born(scene.points_in_world.size());
+  Rigid3d previous_estimate;
+  Rigid3d previous_truth;
+  std::vector<Rigid3d> truth;
+  for (const SyntheticFrame& frame : scene.frames) {
+    Rigid3d start = frame.cam_from_world * inverse(previous_truth) * previous_estimate;
+    if (!truth.empty()) start.params.tail<3>() += random.gaussian3(pose_noise);
+    NewKeyframe made{frame.observations, start, {}, {}, backend.view().origin()};
+    made.landmarks.resize(frame.landmark.size());
+    for (std::uint32_t k = 0; k < frame.landmark.size(); ++k) {
+      const auto index = static_cast<std::size_t>(frame.landmark[k]);
+      made.landmarks[k] = born[index];
+      if (born[index].valid() || !frame.observations->has_right(k)) continue;
+      const Eigen::Vector3d in_cam = frame.cam_from_world * scene.points_in_world[index];
+      made.new_points.emplace_back(k, inverse(start) * (in_cam + random.gaussian3(0.02)));
+    }
+    const KeyframeId id = backend.add(made);
+    for (std::size_t k = 0; k < frame.landmark.size(); ++k) {
+      const LandmarkId landmark = backend.view().at(id).landmarks[k];
+      if (landmark.valid()) born[static_cast<std::size_t>(frame.landmark[k])] = landmark;
+    }
+    backend.optimize_local(id);
+    previous_truth = frame.cam_from_world;
+    previous_estimate = backend.view().at(id).cam_from_world;
+    truth.push_back(frame.cam_from_world);
+  }
+  return truth;
+}
+
+double worst_position_error(const MapSnapshot& map, const std::vector<Rigid3d>& truth) {
+  double worst = 0;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const Eigen::Vector3d at = inverse(map.at(id).cam_from_world).translation();
+    worst = std::max(worst, (at - inverse(truth[id.value]).translation()).norm());
+  }
+  return worst;
+}
+
+TEST_CASE("A map grown with the smoother is as good as after bundle adjustment of everything") {
+  SyntheticSceneOptions scene;
+  scene.times = 25;
+  scene.landmarks = 800;
+  scene.outlier_rate = 0.02;
+  BackendOptions options;
+  options.local_method = LocalMethod::kIncremental;
+  options.full.problem.rounds = {{50, Loss::kHuber, 1e-10}};
+  Backend backend(options);
+  const std::vector<Rigid3d> truth = grow(make_synthetic_scene(scene), backend, 0.01);
+  const double grown = worst_position_error(backend.view(), truth);
+  const BundleSummary full = backend.optimize_full();
+  const double adjusted = worst_position_error(backend.view(), truth);
+  CHECK(full.initial_cost < 1.02 * full.final_cost);
+  CHECK(full.observations > 2000);
+  CHECK(grown < 1.1 * adjusted);
+  CHECK(adjusted < 0.05);
+}
+
+TEST_CASE("A smoother with a window goes on where keyframes were marginalised") {
+  SyntheticSceneOptions scene;
+  scene.times = 40;
+  scene.landmarks = 800;
+  BackendOptions options;
+  options.local_method = LocalMethod::kIncremental;
+  options.incremental.solver.window = 8;
+  Backend backend(options);
+  const std::vector<Rigid3d> truth = grow(make_synthetic_scene(scene), backend, 0.01);
+  CHECK(backend.map().check_consistency() == std::vector<std::string>{});
+  CHECK(worst_position_error(backend.view(), truth) < 0.05);
+}
+
+}  // namespace
+}  // namespace hybrid_slam
