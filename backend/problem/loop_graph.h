@@ -7,6 +7,14 @@
 
 namespace hybrid_slam {
 
+// One round, in which false loops lose their say.
+inline ProblemOptions loop_graph_problem() {
+  ProblemOptions problem;
+  problem.rounds = {{20, Loss::kNone, 1e-8}};
+  problem.loop_loss = Loss::kCauchy;
+  return problem;
+}
+
 struct LoopGraphOptions {
   int min_shared_landmarks = 100;  // of a covisibility edge to be kept
   bool with_scale = false;         // Sim3: where the scale may have drifted
@@ -14,7 +22,7 @@ struct LoopGraphOptions {
   double translation_sigma = 0.05;  // [m]
   double rotation_sigma = 0.01;     // [rad]
   double scale_sigma = 0.01;        // of the logarithm
-  ProblemOptions problem{.rounds = {{20, Loss::kNone, 1e-8}}, .loop_loss = Loss::kCauchy};
+  ProblemOptions problem = loop_graph_problem();
 };
 
 // The essential graph of a map (ORB-SLAM2, section V-C): its spanning tree and its strong
