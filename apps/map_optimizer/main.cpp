@@ -66,9 +66,6 @@ void warn_of_limits(const OptimizerOptions& options, const FactorGraph& graph) {
   if (refines && !options.fix_intrinsics) {
     spdlog::warn("incremental: the intrinsics are kept as they are");
   }
-  if (loss_of(options) != Loss::kNone && !graph.edges.empty()) {
-    spdlog::warn("incremental: edges take no robust loss");
-  }
 }
 
 // Only the estimate goes back to the file's graph: what a problem fixes or leaves out is its own.

@@ -200,7 +200,7 @@ PoseGraphOptions pose_graph_options(const OptimizerOptions& options) {
 
 IncrementalOptions incremental_options(const OptimizerOptions& options) {
   IncrementalOptions solver;
-  solver.loss = loss_of(options);
+  solver.loss = solver.loop_loss = loss_of(options);
   return solver;
 }
 

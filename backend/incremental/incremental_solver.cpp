@@ -57,7 +57,8 @@ std::string IncrementalOptions::validate() const {
   if (!(wildfire >= 0)) return "wildfire must not be negative";
   if (max_steps < 1) return "max_steps must be positive";
   if (!(budget >= 0)) return "budget must not be negative";
-  if (!(chi2_mono > 0) || !(chi2_stereo > 0)) return "chi2 thresholds must be positive";
+  if (!(chi2_mono > 0) || !(chi2_stereo > 0) || !(chi2_loop > 0))
+    return "chi2 thresholds must be positive";
   return {};
 }
 
@@ -254,7 +255,7 @@ Matrix6d IncrementalSolver::covariance(std::uint32_t pose) const {
 
 Rigid3d IncrementalSolver::pose(std::uint32_t index) const {
   const Pose& pose = poses_.at(index);
-  if (pose.fixed) return pose.folded;
+  if (pose.fixed || tree_.delta(index) == pose.folded_delta) return pose.folded;
   return pose.tangent.moved(pose.folded, tree_.delta(index) - pose.folded_delta);
 }
 

@@ -20,7 +20,6 @@ struct LandmarkView {
   std::uint32_t pose = 0;
   bool fixed = false;   // the pose is known: by_pose is zero
   bool usable = false;  // the point projects
-  double weight = 1;    // of its robust loss: residual and derivatives are multiplied by it
   Eigen::Matrix<double, 3, 6> by_pose = Eigen::Matrix<double, 3, 6>::Zero();
   Eigen::Matrix3d by_point = Eigen::Matrix3d::Zero();
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();

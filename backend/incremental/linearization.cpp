@@ -16,6 +16,13 @@ namespace {
 // Squared mismatch of an observation that does not project any more.
 constexpr double kFarOff = 1e6;
 
+// The square root of the weight that a loss gives a term.
+double robust_weight(Loss loss, double threshold, double squared) {
+  if (loss == Loss::kCauchy) return std::sqrt(1 / (1 + squared / threshold));
+  if (loss == Loss::kHuber && squared > threshold) return std::pow(threshold / squared, 0.25);
+  return 1;
+}
+
 // How often the step of a point is cut in half before it is given up.
 constexpr int kHalvings = 10;
 
@@ -30,6 +37,18 @@ void IncrementalSolver::linearize(std::uint32_t term) {
   }
 }
 
+double IncrementalSolver::edge_weight(std::uint32_t index, const Vector6d& residual) const {
+  const Loss loss = edges_[index].loop ? options_.loop_loss : Loss::kNone;
+  return robust_weight(loss, options_.chi2_loop, residual.squaredNorm());
+}
+
+double IncrementalSolver::view_weight(const LandmarkView& view,
+                                      const Eigen::Vector3d& residual) const {
+  const bool stereo = observation_factors_[view.observation]->num_residuals() == 3;
+  return robust_weight(options_.loss, stereo ? options_.chi2_stereo : options_.chi2_mono,
+                       residual.squaredNorm());
+}
+
 void IncrementalSolver::linearize_edge(std::uint32_t index) {
   if (edge_there_[index] == 0) return;
   const GraphEdge& edge = edges_[index];
@@ -41,12 +60,14 @@ void IncrementalSolver::linearize_edge(std::uint32_t index) {
   double* jacobians[] = {by_a, by_b};
   EdgeTerm& term = edge_terms_[index];
   edge_factors_[index]->Evaluate(blocks, term.residual.data(), jacobians);
+  const double weight = edge_weight(index, term.residual);
+  term.residual *= weight;
   using RowMajor67 = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
   std::size_t k = 0;
   for (const auto& [pose, jacobian] : {std::pair(edge.a, by_a), std::pair(edge.b, by_b)}) {
     if (poses_[pose].fixed) continue;
     const Vector6d& at = tree_.delta(pose);
-    const Matrix6d by_left = Eigen::Map<const RowMajor67>(jacobian).leftCols<6>();
+    const Matrix6d by_left = weight * Eigen::Map<const RowMajor67>(jacobian).leftCols<6>();
     term.by_pose[k] = poses_[pose].tangent.from_left(by_left, pose == edge.a ? a : b);
     term.residual.noalias() -= term.by_pose[k] * at;
     ++k;
@@ -64,18 +85,7 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
   view.residual.setZero();
   double* jacobians[] = {by_pose.data(), by_point.data()};
   if (!factor.Evaluate(blocks, view.residual.data(), jacobians)) return false;
-  double weight = 1;
-  if (options_.loss != Loss::kNone) {
-    const double squared = view.residual.squaredNorm();
-    const double threshold =
-        factor.num_residuals() == 3 ? options_.chi2_stereo : options_.chi2_mono;
-    if (options_.loss == Loss::kCauchy) {
-      weight = std::sqrt(1 / (1 + squared / threshold));
-    } else if (squared > threshold) {
-      weight = std::pow(threshold / squared, 0.25);
-    }
-  }
-  view.weight = weight;
+  const double weight = view_weight(view, view.residual);
   view.residual *= weight;
   view.by_point = weight * by_point;
   if (!view.fixed) {
@@ -121,15 +131,20 @@ void IncrementalSolver::linearize_landmark(std::uint32_t index) {
   landmark.eliminate();
 }
 
-IncrementalSolver::Evaluation IncrementalSolver::evaluate_edge(std::uint32_t index) const {
-  if (edge_there_[index] == 0) return {};
-  const GraphEdge& edge = edges_[index];
-  const EdgeTerm& term = edge_terms_[index];
-  const Rigid3d a = pose(edge.a);
-  const Rigid3d b = pose(edge.b);
+Vector6d IncrementalSolver::edge_residual(std::uint32_t index) const {
+  const Rigid3d a = pose(edges_[index].a);
+  const Rigid3d b = pose(edges_[index].b);
   const double* blocks[] = {a.params.data(), b.params.data()};
   Vector6d residual;
   edge_factors_[index]->Evaluate(blocks, residual.data(), nullptr);
+  return residual;
+}
+
+IncrementalSolver::Evaluation IncrementalSolver::evaluate_edge(std::uint32_t index) const {
+  if (edge_there_[index] == 0) return {};
+  const EdgeTerm& term = edge_terms_[index];
+  Vector6d residual = edge_residual(index);
+  residual *= edge_weight(index, residual);
   Vector6d difference = residual - term.residual;
   for (std::size_t k = 0; k < term.variable; ++k) {
     difference.noalias() -= term.by_pose[k] * tree_.delta(term.poses[k]);
@@ -154,8 +169,9 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
       result.squared_mismatch += kFarOff;
       continue;
     }
+    residual *= view_weight(view, residual);
     result.squared_norm += residual.squaredNorm();
-    residual = view.weight * residual - view.residual - view.by_point * by_point;
+    residual -= view.residual + view.by_point * by_point;
     if (!view.fixed) residual.noalias() -= view.by_pose * tree_.delta(view.pose);
     result.squared_mismatch += residual.squaredNorm();
   }
@@ -180,7 +196,9 @@ double IncrementalSolver::chi2(std::uint32_t observation) const {
 
 double IncrementalSolver::cost() const {
   double sum = 0;
-  for (std::uint32_t i = 0; i < edges_.size(); ++i) sum += evaluate_edge(i).squared_norm;
+  for (std::uint32_t i = 0; i < edges_.size(); ++i) {
+    if (edge_there_[i] != 0) sum += edge_residual(i).squaredNorm();
+  }
   for (std::uint32_t i = 0; i < landmarks_.size(); ++i) {
     const Eigen::Vector3d at = point(i);
     for (const LandmarkView& view : landmarks_[i].views) {
