@@ -208,7 +208,7 @@ GraphFile read_colmap(const fs::path& folder, ColmapVariant variant) {
                                                                  : read_colmap_binary(folder));
   GraphFile file = to_graph(*model);
   if (joins_images(*model)) {
-    file.warnings.push_back(
+    file.warnings.emplace_back(
         "rigs join several images; the images are optimised and written each on its own");
   }
   const auto add_writer = [&](ColmapVariant written) {
