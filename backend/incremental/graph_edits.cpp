@@ -1,0 +1,182 @@
+#include <ceres/cost_function.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "backend/incremental/incremental_solver.h"
+#include "backend/problem/measurement_fault.h"
+#include "factors/make_reprojection_factor.h"
+#include "factors/relative_pose_factor.h"
+
+// What is added to the graph of an IncrementalSolver, and what is taken out.
+
+namespace hybrid_slam {
+
+namespace {
+
+template <typename T>
+T& item(std::vector<T>& items, std::uint32_t index, const char* what) {
+  if (index >= items.size())
+    throw std::logic_error(std::string("IncrementalSolver: no such ") + what);
+  return items[index];
+}
+
+// Throws if there is a fault.
+void refuse(const char* fault, const char* what) {
+  if (fault == nullptr) return;
+  throw std::logic_error("IncrementalSolver: " + std::string(what) + ": " + fault);
+}
+
+bool sees(const LandmarkTerm& landmark, std::uint32_t pose) {
+  return std::any_of(landmark.views.begin(), landmark.views.end(),
+                     [&](const LandmarkView& view) { return view.pose == pose; });
+}
+
+void erase_value(std::vector<std::uint32_t>& values, std::uint32_t value) {
+  values.erase(std::remove(values.begin(), values.end(), value), values.end());
+}
+
+}  // namespace
+
+std::uint32_t IncrementalSolver::add_camera(const Camera& camera) {
+  cameras_.push_back(camera);
+  return static_cast<std::uint32_t>(cameras_.size()) - 1;
+}
+
+std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
+  refuse(frame.cam_from_world.params.allFinite() ? nullptr : "not finite", "pose");
+  const auto index = static_cast<std::uint32_t>(poses_.size());
+  Pose pose;
+  pose.tangent.place = inverse(frame.cam_from_world).translation();
+  pose.folded = frame.cam_from_world;
+  pose.camera = frame.camera;
+  pose.fixed = frame.fixed;
+  poses_.push_back(std::move(pose));
+  tree_.resize(poses_.size());
+  if (!frame.fixed) newest_.push_back(index);
+  return index;
+}
+
+std::uint32_t IncrementalSolver::add_point(const Eigen::Vector3d& in_world) {
+  refuse(in_world.allFinite() ? nullptr : "not finite", "point");
+  LandmarkTerm landmark;
+  landmark.base = in_world;
+  if (!free_points_.empty()) {
+    const std::uint32_t index = free_points_.back();
+    free_points_.pop_back();
+    landmarks_[index] = std::move(landmark);
+    point_there_[index] = 1;
+    return index;
+  }
+  landmarks_.push_back(std::move(landmark));
+  point_there_.push_back(1);
+  landmark_terms_.push_back(
+      add_term(TermKind::kLandmark, static_cast<std::uint32_t>(landmarks_.size()) - 1));
+  return static_cast<std::uint32_t>(landmarks_.size()) - 1;
+}
+
+std::uint32_t IncrementalSolver::add_term(TermKind kind, std::uint32_t index) {
+  Term term;
+  term.kind = kind;
+  term.index = index;
+  terms_.push_back(term);
+  return static_cast<std::uint32_t>(terms_.size()) - 1;
+}
+
+std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observation) {
+  Pose& pose = item(poses_, observation.frame, "pose");
+  LandmarkTerm& landmark = item(landmarks_, observation.point, "point");
+  refuse(point_there_[observation.point] != 0 ? nullptr : "was removed", "point");
+  const Camera& camera = item(cameras_, pose.camera, "camera");
+  refuse(measurement_fault(observation, camera), "observation");
+  const std::uint32_t index = free_observation();
+  observations_[index] = observation;
+  observation_there_[index] = 1;
+  observation_factors_[index] =
+      make_reprojection_factor(camera, observation.measurement, observation.sigma);
+  LandmarkView view;
+  view.observation = index;
+  view.pose = observation.frame;
+  view.fixed = pose.fixed;
+  const bool is_first = !sees(landmark, observation.frame);
+  landmark.views.push_back(view);
+  if (!pose.fixed && is_first) {
+    landmark.poses.push_back(observation.frame);
+    pose.terms.push_back(landmark_terms_[observation.point]);
+  }
+  mark_dirty(landmark_terms_[observation.point]);
+  return index;
+}
+
+std::uint32_t IncrementalSolver::free_observation() {
+  if (!free_observations_.empty()) {
+    const std::uint32_t index = free_observations_.back();
+    free_observations_.pop_back();
+    return index;
+  }
+  observations_.emplace_back();
+  observation_there_.push_back(0);
+  observation_factors_.emplace_back();
+  return static_cast<std::uint32_t>(observations_.size()) - 1;
+}
+
+std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
+  item(poses_, edge.a, "pose");
+  item(poses_, edge.b, "pose");
+  refuse(measurement_fault(edge), "edge");
+  const auto index = static_cast<std::uint32_t>(edges_.size());
+  edges_.push_back(edge);
+  edge_there_.push_back(1);
+  edge_factors_.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
+  EdgeTerm term;
+  for (const std::uint32_t pose : {edge.a, edge.b}) {
+    if (!poses_[pose].fixed) term.poses[term.variable++] = pose;
+  }
+  edge_terms_.push_back(term);
+  const std::uint32_t id = add_term(TermKind::kEdge, index);
+  edge_ids_.push_back(id);
+  for (const std::uint32_t pose : poses_of(id)) poses_[pose].terms.push_back(id);
+  mark_dirty(id);
+  return index;
+}
+
+void IncrementalSolver::remove_observation(std::uint32_t observation) {
+  if (item(observation_there_, observation, "observation") == 0) return;
+  observation_there_[observation] = 0;
+  const GraphObservation& removed = observations_[observation];
+  LandmarkTerm& landmark = landmarks_[removed.point];
+  const std::uint32_t term = landmark_terms_[removed.point];
+  mark_dirty(term);  // before: its former poses are touched too
+  observation_factors_[observation].reset();
+  free_observations_.push_back(observation);
+  std::erase_if(landmark.views,
+                [&](const LandmarkView& view) { return view.observation == observation; });
+  if (!poses_[removed.frame].fixed && !sees(landmark, removed.frame)) {
+    touched_.push_back(removed.frame);
+    erase_value(landmark.poses, removed.frame);
+    erase_value(poses_[removed.frame].terms, term);
+  }
+}
+
+void IncrementalSolver::remove_point(std::uint32_t point) {
+  const LandmarkTerm& landmark = item(landmarks_, point, "point");
+  if (point_there_[point] == 0) return;
+  point_there_[point] = 0;
+  while (!landmark.views.empty()) remove_observation(landmark.views.back().observation);
+  free_points_.push_back(point);
+}
+
+void IncrementalSolver::remove_edge(std::uint32_t edge) {
+  if (item(edge_there_, edge, "edge") == 0) return;
+  edge_there_[edge] = 0;
+  mark_dirty(edge_ids_[edge]);
+  for (std::size_t i = 0; i < edge_terms_[edge].variable; ++i) {
+    const std::uint32_t pose = edge_terms_[edge].poses[i];
+    touched_.push_back(pose);
+    erase_value(poses_[pose].terms, edge_ids_[edge]);
+  }
+  edge_terms_[edge].variable = 0;
+}
+
+}  // namespace hybrid_slam
