@@ -5,36 +5,10 @@
 #include <numeric>
 #include <tuple>
 
+#include "frontend/features/spread_grid.h"
+
 namespace hybrid_slam {
 namespace {
-
-// Cells small enough to spread, large enough that a cell's strongest are worth having.
-constexpr int kKeypointsPerCell = 8;
-constexpr double kStrongestShare = 0.75;
-
-struct Grid {
-  double cell_size = 1;  // [px]
-  int columns = 1;
-  int rows = 1;
-
-  std::size_t cells() const {
-    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
-  }
-  std::size_t cell_of(const Keypoint& keypoint) const {
-    const int column = std::clamp(static_cast<int>((keypoint.x + 0.5) / cell_size), 0, columns - 1);
-    const int row = std::clamp(static_cast<int>((keypoint.y + 0.5) / cell_size), 0, rows - 1);
-    return static_cast<std::size_t>(row * columns + column);
-  }
-};
-
-Grid make_grid(int width, int height, int max_count) {
-  const double cells = std::max(1.0, static_cast<double>(max_count) / kKeypointsPerCell);
-  Grid grid;
-  grid.cell_size = std::max(1.0, std::sqrt(static_cast<double>(width) * height / cells));
-  grid.columns = static_cast<int>(std::ceil(width / grid.cell_size));
-  grid.rows = static_cast<int>(std::ceil(height / grid.cell_size));
-  return grid;
-}
 
 bool inside(const Keypoint& keypoint, int width, int height) {
   return keypoint.x >= -0.5F && keypoint.y >= -0.5F &&
@@ -78,12 +52,15 @@ std::vector<int> select_spread(const std::vector<Keypoint>& keypoints, int width
             [&](int a, int b) { return strength(at(a)) < strength(at(b)); });
   if (std::ssize(order) <= max_count) return order;
 
-  const Grid grid = make_grid(width, height, max_count);
-  const auto strongest = static_cast<std::size_t>(max_count * kStrongestShare);
-  std::vector<int> available(grid.cells(), 0);
-  std::vector<int> taken(grid.cells(), 0);
+  const SpreadGrid grid = make_spread_grid(width, height, max_count);
+  const auto cell_of = [&](int i) {
+    return static_cast<std::size_t>(grid.cell_of(at(i).x, at(i).y));
+  };
+  const auto strongest = static_cast<std::size_t>(strongest_count(max_count));
+  std::vector<int> available(static_cast<std::size_t>(grid.cells()), 0);
+  std::vector<int> taken(available);
   for (std::size_t k = 0; k < order.size(); ++k) {
-    const std::size_t cell = grid.cell_of(at(order[k]));
+    const std::size_t cell = cell_of(order[k]);
     ++available[cell];
     if (k < strongest) ++taken[cell];
   }
@@ -93,7 +70,7 @@ std::vector<int> select_spread(const std::vector<Keypoint>& keypoints, int width
   int kept = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
     if (k >= strongest) {
-      int& in_cell = taken[grid.cell_of(at(order[k]))];
+      int& in_cell = taken[cell_of(order[k])];
       if (in_cell >= quota) continue;
       ++in_cell;
     }

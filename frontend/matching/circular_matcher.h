@@ -2,15 +2,10 @@
 
 #include <vector>
 
+#include "frontend/matching/circular_match.h"
 #include "frontend/matching/stereo_matcher.h"
 
 namespace hybrid_slam {
-
-// A point seen in all four images of two successive stereo frames; indices into the left keypoints.
-struct CircularMatch {
-  int previous = 0;
-  int current = 0;
-};
 
 struct CircularMatcherOptions {
   double max_descriptor_distance = 0.9;  // L2 between unit descriptors

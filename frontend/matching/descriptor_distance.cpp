@@ -1,8 +1,5 @@
 #include "frontend/matching/descriptor_distance.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 
 // Compiled once per instruction set; the best one that the machine has is chosen at run time.
@@ -48,10 +45,6 @@ namespace hybrid_slam {
 HWY_EXPORT(one_distance);
 HWY_EXPORT(many_distances);
 
-namespace {
-constexpr double kDescriptorLength = 512;
-}
-
 std::int32_t squared_distance(const Descriptor& a, const Descriptor& b) {
   return HWY_DYNAMIC_DISPATCH(one_distance)(a.data(), b.data());
 }
@@ -61,20 +54,6 @@ void squared_distances(const Descriptor& query, std::span<const Descriptor> desc
   if (candidates.size() != distances.size()) throw std::logic_error("squared_distances: sizes");
   HWY_DYNAMIC_DISPATCH(many_distances)
   (query.data(), descriptors.data(), candidates.data(), candidates.size(), distances.data());
-}
-
-std::int32_t to_squared_bytes(double distance) {
-  const double bytes = std::max(0.0, distance) * kDescriptorLength;
-  constexpr double kMax = std::numeric_limits<std::int32_t>::max();
-  return static_cast<std::int32_t>(std::min(std::floor(bytes * bytes), kMax));
-}
-
-double from_squared_bytes(std::int32_t squared_distance) {
-  return std::sqrt(static_cast<double>(squared_distance)) / kDescriptorLength;
-}
-
-bool passes_ratio(std::int32_t best, std::int32_t second, double ratio) {
-  return second < 0 || best < ratio * ratio * second;
 }
 
 }  // namespace hybrid_slam

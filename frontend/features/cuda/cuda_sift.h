@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontend/features/sift.h"
+
+namespace hybrid_slam {
+
+// Empty if there is a device that kernels can run on, else why not.
+std::string why_no_cuda();
+
+// SIFT as defined in frontend/features/definition on a CUDA device. Every instance has a stream and
+// memory of its own; what start() enqueues runs while the caller does something else, another
+// instance's start(), say. Errors of CUDA are std::runtime_error.
+class CudaSift final : public SiftExtractor {
+ public:
+  // On the current device. Throws std::invalid_argument if the options are not valid, or a blur
+  // reaches too far for the kernels (initial_sigma above 3 with 3 layers).
+  explicit CudaSift(const SiftOptions& options);
+  ~CudaSift() override;
+
+  // start() and finish().
+  FeatureSet extract(const GrayImage& image, const GrayImage* mask) override;
+
+  // Enqueues all work for an image, which may change as soon as this returns.
+  void start(const GrayImage& image, const GrayImage* mask);
+  // Waits for what was started last and returns its features.
+  FeatureSet finish();
+
+  // Milliseconds of the device per stage of the image last finished, for measurements: with this,
+  // work is not recorded as a graph, which takes longer as a whole.
+  void time_stages(bool timed);
+  std::vector<std::pair<std::string, double>> stage_times() const;
+
+ private:
+  friend class CudaFeatures;
+  struct Engine;
+  std::unique_ptr<Engine> engine_;
+};
+
+}  // namespace hybrid_slam
