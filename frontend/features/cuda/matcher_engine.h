@@ -108,19 +108,21 @@ class MatcherEngine {
 
   void reserve(int count) {
     if (count <= capacity_) return;
+    capacity_ = 0;  // and so it stays if there is too little memory
     backend_.release();
-    capacity_ = std::max(count, 1024);
-    const int tiles = (capacity_ + kTile - 1) / kTile;
-    for (Nearest*& of_tiles : tiles_) of_tiles = take<Nearest>(tiles * capacity_);
-    for (Nearest*& nearest : nearest_) nearest = take<Nearest>(capacity_);
-    for (unsigned*& gathered : gathered_) gathered = take<unsigned>(capacity_ * kWords);
-    matches_ = take<Match>(capacity_);
-    partners_ = take<int>(capacity_);
-    chosen_ = take<int>(4 * capacity_);
-    host_matches_ = take_for_host<Match>(capacity_);
-    host_partners_ = take_for_host<int>(capacity_);
-    host_chosen_ = take_for_host<int>(4 * capacity_);
-    std::memset(host_chosen_, 0, static_cast<std::size_t>(4 * capacity_) * sizeof(int));
+    const int capacity = std::max(count, 1024);
+    const int tiles = (capacity + kTile - 1) / kTile;
+    for (Nearest*& of_tiles : tiles_) of_tiles = take<Nearest>(tiles * capacity);
+    for (Nearest*& nearest : nearest_) nearest = take<Nearest>(capacity);
+    for (unsigned*& gathered : gathered_) gathered = take<unsigned>(capacity * kWords);
+    matches_ = take<Match>(capacity);
+    partners_ = take<int>(capacity);
+    chosen_ = take<int>(4 * capacity);
+    host_matches_ = take_for_host<Match>(capacity);
+    host_partners_ = take_for_host<int>(capacity);
+    host_chosen_ = take_for_host<int>(4 * capacity);
+    std::memset(host_chosen_, 0, static_cast<std::size_t>(4 * capacity) * sizeof(int));
+    capacity_ = capacity;
   }
 
   Pairs list_pairs(const StereoView& stereo, int frame) {

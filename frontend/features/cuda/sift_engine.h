@@ -1,8 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
-#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "frontend/features/cuda/blur_weights.h"
@@ -94,6 +95,7 @@ class SiftEngine {
   int width_ = 0;  // of the image
   int height_ = 0;
   bool masked_ = false;
+  bool allocated_ = false;
   int extrema_capacity_ = 0;
 
   std::uint8_t* host_pixels_ = nullptr;  // of the image, then of the mask

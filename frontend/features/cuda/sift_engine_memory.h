@@ -17,7 +17,7 @@ int SiftEngine<Backend>::octaves_of(int width, int height) const {
 
 template <typename Backend>
 void SiftEngine<Backend>::prepare(int width, int height, bool masked) {
-  if (width == width_ && height == height_) {
+  if (allocated_ && width == width_ && height == height_) {
     if (masked == masked_) return;
     masked_ = masked;
     backend_.forget();
@@ -34,6 +34,7 @@ void SiftEngine<Backend>::prepare(int width, int height, bool masked) {
 
 template <typename Backend>
 void SiftEngine<Backend>::allocate() {
+  allocated_ = false;  // and so it stays if there is too little memory
   backend_.release();
   if (octaves_of(width_, height_) == 0) return;
   const std::size_t pixels = static_cast<std::size_t>(width_) * height_;
@@ -43,6 +44,7 @@ void SiftEngine<Backend>::allocate() {
   backend_.upload_now(weights_, padded_weights_.data(), padded_weights_.size() * sizeof(float));
   allocate_scale_space();
   allocate_results();
+  allocated_ = true;
 }
 
 template <typename Backend>
