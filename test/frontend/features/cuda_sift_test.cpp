@@ -2,76 +2,25 @@
 // its threads and blocks in both orders: what differs would be a race on a device.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <memory>
-#include <numbers>
 #include <random>
 #include <tuple>
 #include <vector>
 
 #include <catch2/catch.hpp>
 #include "frontend/features/cpu/cpu_sift.h"
-#include "frontend/features/cuda/on_host.h"
-#include "frontend/features/cuda/sift_engine.h"
 #include "frontend/features/feature_selection.h"
+#include "test/frontend/features/feature_agreement.h"
+#include "test/frontend/features/host_cuda_sift.h"
 #include "test/frontend/features/test_images.h"
 
 namespace hybrid_slam::cuda {
 namespace {
 
-FeatureSet extract(SiftEngine<OnHost>& engine, const GrayImage& image, const GrayImage* mask) {
-  engine.start(image, mask);
-  return engine.finish();
-}
-
-bool same_bytes(const FeatureSet& a, const FeatureSet& b) {
-  return a.size() == b.size() && a.descriptors == b.descriptors &&
-         std::memcmp(a.keypoints.data(), b.keypoints.data(), a.size() * sizeof(Keypoint)) == 0;
-}
-
 // In both orders of threads and blocks.
 FeatureSet extract(const SiftOptions& options, const GrayImage& image, const GrayImage* mask) {
-  SiftEngine<OnHost> forward(options);
-  SiftEngine<OnHost> backward(options, true);
-  FeatureSet features = extract(forward, image, mask);
-  CHECK(same_bytes(features, extract(backward, image, mask)));
+  FeatureSet features = HostCudaSift(options).extract(image, mask);
+  CHECK(same_bytes(features, HostCudaSift(options, true).extract(image, mask)));
   return features;
-}
-
-struct Agreement {
-  double found = 0;         // share of the first's keypoints
-  double median_angle = 0;  // [deg]
-  int worst_byte = 0;       // of descriptors of the same angle
-};
-
-double angle_between(const Keypoint& a, const Keypoint& b) {
-  return std::abs(std::remainder(a.angle - b.angle, 2 * std::numbers::pi)) * 180 / std::numbers::pi;
-}
-
-Agreement agreement(const FeatureSet& a, const FeatureSet& b) {
-  Agreement result;
-  std::vector<double> angles;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const Keypoint& k = a.keypoints[i];
-    const Keypoint* best = nullptr;
-    for (const Keypoint& other : b.keypoints) {
-      if (std::hypot(k.x - other.x, k.y - other.y) > 0.1) continue;
-      if (std::abs(other.scale / k.scale - 1) > 0.02) continue;
-      if (!best || angle_between(k, other) < angle_between(k, *best)) best = &other;
-    }
-    if (!best) continue;
-    angles.push_back(angle_between(k, *best));
-    if (angles.back() > 0.5) continue;
-    const Descriptor& other = b.descriptors[static_cast<std::size_t>(best - b.keypoints.data())];
-    for (std::size_t j = 0; j < other.size(); ++j) {
-      result.worst_byte = std::max(result.worst_byte, std::abs(a.descriptors[i][j] - other[j]));
-    }
-  }
-  if (a.size() == 0) return {1, 0, 0};
-  std::nth_element(angles.begin(), angles.begin() + std::ssize(angles) / 2, angles.end());
-  result.found = static_cast<double>(angles.size()) / static_cast<double>(a.size());
-  result.median_angle = angles.empty() ? 180 : angles[angles.size() / 2];
-  return result;
 }
 
 void check_agreement(const SiftOptions& options, const GrayImage& image, const GrayImage* mask) {
@@ -81,10 +30,11 @@ void check_agreement(const SiftOptions& options, const GrayImage& image, const G
   CHECK(std::abs(std::ssize(ours.keypoints) - std::ssize(cpu.keypoints)) <=
         std::ssize(cpu.keypoints) / 100 + 1);
   for (const auto& [a, b] : {std::tie(ours, cpu), std::tie(cpu, ours)}) {
-    const Agreement result = agreement(a, b);
-    CHECK(result.found >= (a.size() < 50 ? 0.95 : 0.98));
-    CHECK(result.median_angle < 0.1);
-    CHECK(result.worst_byte <= 8);
+    const FeatureAgreement agreement = feature_agreement(a, b);
+    CHECK(agreement.found >= (a.size() < 50 ? 0.95 : 0.98));
+    CHECK(agreement.median_angle < 0.1);
+    CHECK(agreement.median_descriptor_angle < 0.2);
+    CHECK(agreement.worst_byte <= 8);
   }
 }
 
@@ -124,12 +74,12 @@ TEST_CASE("CUDA's SIFT keeps out of the mask as the CPU's does") {
   options.upsample = false;
   check_agreement(options, image, &mask);
   // One instance goes from mask to none and back.
-  SiftEngine<OnHost> engine(options);
-  const std::size_t whole = extract(engine, image, nullptr).size();
-  const std::size_t part = extract(engine, image, &mask).size();
+  HostCudaSift sift(options);
+  const std::size_t whole = sift.extract(image, nullptr).size();
+  const std::size_t part = sift.extract(image, &mask).size();
   CHECK(part > 20);
   CHECK(part < whole / 2);
-  CHECK(extract(engine, image, nullptr).size() == whole);
+  CHECK(sift.extract(image, nullptr).size() == whole);
 }
 
 TEST_CASE("CUDA's SIFT has the scale space of the CPU's") {

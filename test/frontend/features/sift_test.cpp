@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <functional>
 #include <memory>
 #include <numbers>
@@ -12,6 +11,8 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include "test/frontend/features/feature_agreement.h"
+#include "test/frontend/features/host_cuda_sift.h"
 #include "test/frontend/features/test_images.h"
 #include "test/support/opencv_sift.h"
 
@@ -28,15 +29,12 @@ struct Engine {
 // what the tests ask for is no more than it gives.
 const std::vector<Engine>& engines() {
   static const std::vector<Engine> kEngines = {
-      {"ours", DescriptorKind::kRootSift, make_sift},
+      {"CPU", DescriptorKind::kRootSift, make_sift},
+      {"CUDA's kernels on the host", DescriptorKind::kRootSift,
+       [](const SiftOptions& options) { return std::make_unique<HostCudaSift>(options); }},
       {"OpenCV", DescriptorKind::kRootSiftOpenCv, make_opencv_sift},
   };
   return kEngines;
-}
-
-bool same_bytes(const FeatureSet& a, const FeatureSet& b) {
-  return a.size() == b.size() && a.descriptors == b.descriptors &&
-         std::memcmp(a.keypoints.data(), b.keypoints.data(), a.size() * sizeof(Keypoint)) == 0;
 }
 
 const Keypoint* nearest(const FeatureSet& features, const Blob& blob, double radius) {
