@@ -37,6 +37,12 @@ hs_precompiled(hs_common_headers
           <stdexcept> <string> <string_view> <utility> <variant> <vector> <Eigen/Dense>
   DEPENDS Eigen3::Eigen)
 
+# hs_alone(a.cpp ...): sources that are compiled by themselves where others are compiled several at once
+# (CMAKE_UNITY_BUILD): names or macros of theirs, or what they define for a whole program, get in the way.
+function(hs_alone)
+  set_source_files_properties(${ARGV} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 # hs_library(name SOURCES a.cpp ... DEPENDS public targets ... PRIVATE_DEPENDS hidden targets ...)
 # A room without a .cpp file is a header-only library.
 function(hs_library name)

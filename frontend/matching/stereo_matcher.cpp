@@ -46,7 +46,7 @@ class Rows {
   double max_sigma_ = 0;
 };
 
-struct Best {
+struct RowMatch {
   int index = -1;
   std::int32_t distance = -1;  // squared, of the bytes
   std::int32_t second = -1;    // at another place
@@ -60,15 +60,15 @@ class RowMatcher {
 
   std::vector<int> match() {
     const Rows rows(right_.keypoints);
-    std::vector<Best> best_right(left_.size());
-    std::vector<Best> best_left(right_.size());
+    std::vector<RowMatch> best_right(left_.size());
+    std::vector<RowMatch> best_left(right_.size());
     for (std::size_t i = 0; i < left_.size(); ++i) {
       find_candidates(left_.keypoints[i], rows);
       distances_.resize(candidates_.size());
       squared_distances(left_.descriptors[i], right_.descriptors, candidates_, distances_);
       best_right[i] = choose(candidates_, distances_);
       for (std::size_t k = 0; k < candidates_.size(); ++k) {
-        Best& best = best_left[static_cast<std::size_t>(candidates_[k])];
+        RowMatch& best = best_left[static_cast<std::size_t>(candidates_[k])];
         if (best.index < 0 || distances_[k] < best.distance) {
           best = {static_cast<int>(i), distances_[k], -1};
         }
@@ -103,9 +103,9 @@ class RowMatcher {
   }
 
   // Ties go to the lower index.
-  Best choose(const std::vector<int>& candidates,
+  RowMatch choose(const std::vector<int>& candidates,
               const std::vector<std::int32_t>& distances) const {
-    Best best;
+    RowMatch best;
     for (std::size_t k = 0; k < candidates.size(); ++k) {
       if (best.index >= 0 && distances[k] >= best.distance) continue;
       best.index = candidates[k];
@@ -118,12 +118,12 @@ class RowMatcher {
     return best;
   }
 
-  std::vector<int> keep_mutual(const std::vector<Best>& best_right,
-                               const std::vector<Best>& best_left) const {
+  std::vector<int> keep_mutual(const std::vector<RowMatch>& best_right,
+                               const std::vector<RowMatch>& best_left) const {
     const std::int32_t max_distance = to_squared_bytes(options_.max_descriptor_distance);
     std::vector<int> right_of_left(left_.size(), -1);
     for (std::size_t i = 0; i < left_.size(); ++i) {
-      const Best& best = best_right[i];
+      const RowMatch& best = best_right[i];
       if (best.index < 0 || best.distance > max_distance) continue;
       if (!passes_ratio(best.distance, best.second, options_.ratio)) continue;
       if (best_left[static_cast<std::size_t>(best.index)].index != static_cast<int>(i)) continue;

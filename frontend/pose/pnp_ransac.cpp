@@ -22,7 +22,7 @@ constexpr double kMinSine = 1e-6;           // of the angles in a sample's trian
 constexpr double kMinConditioning = 1e-12;  // smallest / largest eigenvalue of the scaled system
 constexpr int kRefinements = 5;             // inliers are chosen anew before each
 constexpr int kIterations = 10;
-constexpr double kConverged = 1e-10;  // [m, rad]
+constexpr double kConvergedStep = 1e-10;  // [m, rad]
 
 struct Correspondences {
   std::span<const Eigen::Vector3d> bearings;
@@ -174,7 +174,7 @@ std::optional<Rigid3d> minimize(const Correspondences& data, Consensus at) {
     const std::optional<Vector6d> step = equations.solve(0);
     if (!step) return std::nullopt;
     at.cam_from_world = se3_exp(*step) * at.cam_from_world;
-    if (step->norm() < kConverged) break;
+    if (step->norm() < kConvergedStep) break;
   }
   return at.cam_from_world;
 }

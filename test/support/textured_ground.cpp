@@ -49,17 +49,17 @@ double texture(double x, double y, std::uint64_t seed) {
 }
 
 // A rectangle as one camera sees it.
-struct Seen {
+struct SeenGround {
   const TexturedRectangle* rectangle;
   Eigen::Vector3d eye;             // the camera's centre, in the plane's frame
   Eigen::Matrix3d plane_from_eye;  // rotation
 };
 
-double grey(const std::vector<Seen>& rectangles, const Eigen::Vector3d& ray) {
+double grey(const std::vector<SeenGround>& rectangles, const Eigen::Vector3d& ray) {
   double nearest = std::numeric_limits<double>::infinity();
   const TexturedRectangle* hit = nullptr;
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
-  for (const Seen& seen : rectangles) {
+  for (const SeenGround& seen : rectangles) {
     const Eigen::Vector3d direction = seen.plane_from_eye * ray;
     const double length = -seen.eye.z() / direction.z();
     if (!(length > 0 && length < nearest)) continue;
@@ -98,7 +98,7 @@ GrayImage TexturedGround::render(const Calibrated<RectifiedStereo>& camera,
   const auto& [fx, fy, cx, cy, baseline] = camera.params;
   const Rigid3d left_from_eye(Eigen::Quaterniond::Identity(),
                               Eigen::Vector3d(right ? baseline : 0, 0, 0));
-  std::vector<Seen> rectangles;
+  std::vector<SeenGround> rectangles;
   for (const TexturedRectangle& rectangle : rectangles_) {
     const Rigid3d plane_from_eye =
         inverse(rectangle.world_from_plane) * world_from_left * left_from_eye;
