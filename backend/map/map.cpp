@@ -64,6 +64,7 @@ Map::Map() : view_(MapTables{}) {}
 CameraId Map::add_camera(const Camera& camera) {
   auto& cameras = view_.tables_.cameras;
   cameras.push_back(camera);
+  view_.tables_.newest_frame_index.push_back(-1);
   return CameraId(static_cast<std::uint32_t>(cameras.size() - 1));
 }
 
@@ -76,7 +77,8 @@ KeyframeId Map::add_keyframe(const NewKeyframe& made) {
   keyframe.observations = made.observations;
   keyframe.cam_from_world = made.cam_from_world;
   keyframe.landmarks.resize(made.observations->size());
-  tables.newest_frame_index = std::max(tables.newest_frame_index, made.observations->frame_index);
+  std::int64_t& newest = tables.newest_frame_index[made.observations->camera.value];
+  newest = std::max(newest, made.observations->frame_index);
   if (!tables.origin.valid()) {
     tables.origin = id;
     keyframe.keep = true;

@@ -152,7 +152,11 @@ class MapDecoder {
     tables_.origin = KeyframeId(in.number<std::uint32_t>());
     tables_.next_keyframe = in.number<std::uint32_t>();
     tables_.next_landmark = in.number<std::uint32_t>();
-    tables_.newest_frame_index = in.number<std::int64_t>();
+    for (std::size_t camera = 0; camera < tables_.cameras.size(); ++camera) {
+      const auto newest = in.number<std::int64_t>();
+      if (newest < -1) in.fail("negative frame index");
+      tables_.newest_frame_index.push_back(newest);
+    }
     keyframes_ = in.number<std::uint32_t>();
     erased_ = in.number<std::uint32_t>();
     landmarks_ = in.number<std::uint32_t>();
@@ -161,7 +165,6 @@ class MapDecoder {
       in.fail("keyframes that were neither kept nor erased");
     }
     if (tables_.origin.valid() != (keyframes_ > 0)) in.fail("origin without keyframes, or none");
-    if (tables_.newest_frame_index < -1) in.fail("negative frame index");
   }
 
   // Ascending within a table, and below the next one to be given.
@@ -185,7 +188,8 @@ class MapDecoder {
     if (!frame.u_right.empty() && !(baseline(tables_.cameras[frame.camera.value]) > 0)) {
       in.fail("right coordinates of a camera that is no stereo pair");
     }
-    if (frame.frame_index > tables_.newest_frame_index) in.fail("frame after the newest one");
+    if (frame.frame_index > tables_.newest_frame_index[frame.camera.value])
+      in.fail("frame after the newest one");
     if (!kind_) kind_ = frame.features.kind;
     if (frame.features.kind != *kind_) in.fail("descriptors of several kinds");
     keyframe.landmarks.resize(frame.size());

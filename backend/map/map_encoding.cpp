@@ -107,7 +107,7 @@ void encode_map(const MapTables& tables, const MapFileInfo& info, SectionFileWri
   state.number(tables.origin.value);
   state.number(tables.next_keyframe);
   state.number(tables.next_landmark);
-  state.number(tables.newest_frame_index);
+  for (const std::int64_t newest : tables.newest_frame_index) state.number(newest);
   for (const std::size_t size :
        {tables.keyframes.size(), tables.erased.size(), tables.landmarks.size()}) {
     state.number(static_cast<std::uint32_t>(size));

@@ -67,7 +67,9 @@ const Keyframe* MapSnapshot::find_frame(CameraId camera, std::int64_t frame_inde
   return nullptr;
 }
 
-std::int64_t MapSnapshot::newest_frame_index() const { return tables_.newest_frame_index; }
+std::int64_t MapSnapshot::newest_frame_index(CameraId camera) const {
+  return tables_.newest_frame_index.at(camera.value);
+}
 
 Rigid3d MapSnapshot::cam_from_world(KeyframeId id) const {
   if (const Keyframe* keyframe = find(id)) return keyframe->cam_from_world;

@@ -37,8 +37,9 @@ class MapSnapshot {
   // enter in the order of their frames, so recent ones are found at once.
   const Keyframe* find_frame(CameraId camera, std::int64_t frame_index) const;
 
-  // Largest frame index of any keyframe ever added, erased ones included; -1 while there is none.
-  std::int64_t newest_frame_index() const;
+  // Largest frame index of any keyframe of this camera ever added, erased ones included; -1 while
+  // there is none.
+  std::int64_t newest_frame_index(CameraId camera) const;
 
   // Pose of a keyframe that is or was in the map, through the spanning tree if it was erased.
   Rigid3d cam_from_world(KeyframeId id) const;

@@ -27,7 +27,7 @@ struct MapTables {
   KeyframeId origin;
   std::uint32_t next_keyframe = 0;
   std::uint32_t next_landmark = 0;
-  std::int64_t newest_frame_index = -1;  // of any keyframe ever added
+  std::vector<std::int64_t> newest_frame_index;  // per camera, of any keyframe ever added; or -1
 
   // A complete copy that costs next to nothing; see PersistentTable::share().
   MapTables share() {

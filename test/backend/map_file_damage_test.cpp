@@ -145,8 +145,8 @@ TEST_CASE("a damaged file is refused with its name, the place and the reason") {
     refused_as("no map file");
   }
   SECTION("of a later version") {
-    bytes[8] = 2;
-    refused_as("version 2 of the format, where this program knows 1");
+    bytes[8] = 3;
+    refused_as("version 3 of the format, where this program knows 2");
   }
   SECTION("a byte changed") {
     bytes[bytes.size() / 2] ^= 4;

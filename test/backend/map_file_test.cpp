@@ -57,7 +57,7 @@ TEST_CASE("an empty map comes back, with cameras and without") {
   check_round_trip(map);
   map.add_camera(synthetic_fisheye_camera());
   LoadedMap loaded = check_round_trip(map);
-  CHECK(loaded.map.view().newest_frame_index() == -1);
+  CHECK(loaded.map.view().newest_frame_index(CameraId(0)) == -1);
   CHECK(loaded.map.add_camera(synthetic_stereo_camera(0.1)) == CameraId(1));
 }
 

@@ -85,7 +85,7 @@ TEST_CASE("The first keyframe is the origin and its stereo points are born") {
 
 TEST_CASE("A keyframe is found by its frame until it is erased") {
   TinyMap tiny(true);
-  CHECK(tiny.view().newest_frame_index() == -1);
+  CHECK(tiny.view().newest_frame_index(CameraId(0)) == -1);
   std::vector<KeyframeId> added;
   for (const int frame : {0, 4, 9}) {
     NewKeyframe made = tiny.frame(3);
@@ -95,7 +95,9 @@ TEST_CASE("A keyframe is found by its frame until it is erased") {
     added.push_back(tiny.map.add_keyframe(made));
   }
   const CameraId camera = tiny.view().at(added[0]).observations->camera;
-  CHECK(tiny.view().newest_frame_index() == 9);
+  CHECK(tiny.view().newest_frame_index(camera) == 9);
+  const CameraId other = tiny.map.add_camera(synthetic_fisheye_camera());
+  CHECK(tiny.view().newest_frame_index(other) == -1);
   REQUIRE(tiny.view().find_frame(camera, 4) != nullptr);
   CHECK(tiny.view().find_frame(camera, 4)->id == added[1]);
   CHECK(tiny.view().find_frame(camera, 5) == nullptr);
@@ -104,7 +106,7 @@ TEST_CASE("A keyframe is found by its frame until it is erased") {
   edit.erased_keyframes = {added[2]};
   tiny.map.apply(edit);
   CHECK(tiny.view().find_frame(camera, 9) == nullptr);
-  CHECK(tiny.view().newest_frame_index() == 9);
+  CHECK(tiny.view().newest_frame_index(CameraId(0)) == 9);
 }
 
 TEST_CASE("A mono keypoint alone gives no landmark") {
