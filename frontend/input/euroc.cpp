@@ -108,7 +108,7 @@ EurocFrames match_stamps(const std::vector<StampedFile>& left,
     const std::int64_t difference = right[r].stamp - left[l].stamp;
     if (std::abs(difference) <= kMaxStampDifference) {
       frames.times.push_back(static_cast<double>(left[l].stamp) * kNanosecond);
-      frames.files.push_back({left[l++].path, right[r++].path});
+      frames.files.push_back({left[l++].path, right[r++].path, {}});
     } else {
       ++(difference > 0 ? l : r);
     }

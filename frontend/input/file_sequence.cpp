@@ -32,11 +32,11 @@ FileSequence::FileSequence(SequenceInfo info, std::vector<FramePaths> files,
   if (files_.size() != info_.times.size()) throw std::logic_error("one time per frame");
 }
 
-StereoImages FileSequence::read(std::size_t frame) const {
+FrameImages FileSequence::read(std::size_t frame) const {
   const FramePaths& paths = files_.at(frame);
   const ImageSize size{info_.stereo.width, info_.stereo.height};
   const std::string name = info_.name + ": frame " + std::to_string(frame);
-  StereoImages images;
+  FrameImages images;
   images.frame_index = static_cast<std::int64_t>(frame);
   images.time = info_.times[frame];
   images.left = read_or_throw(paths.left, size, name, "left");
@@ -44,6 +44,14 @@ StereoImages FileSequence::read(std::size_t frame) const {
   if (rectifier_) {
     rectifier_->rectify_left(images.left);
     rectifier_->rectify_right(images.right);
+  }
+  if (info_.fisheye) {
+    try {
+      images.fisheye = read_or_throw(paths.fisheye, {info_.fisheye->width, info_.fisheye->height},
+                                     name, "fisheye");
+    } catch (const InputError& error) {
+      images.fisheye_error = error.what();
+    }
   }
   return images;
 }
@@ -90,7 +98,8 @@ NumberedFrames match_frames(const std::vector<double>& times, const fs::path& ti
     const auto left_path = left.find(number);
     const auto right_path = right.find(number);
     frames.files.push_back({left_path == left.end() ? fs::path() : left_path->second,
-                            right_path == right.end() ? fs::path() : right_path->second});
+                            right_path == right.end() ? fs::path() : right_path->second,
+                            {}});
     frames.times.push_back(times[static_cast<std::size_t>(number)]);
   }
   const fs::path folder = left.begin()->second.parent_path();
@@ -110,6 +119,23 @@ void check_completeness(const std::vector<FramePaths>& files, const std::string&
       (files[static_cast<std::size_t>(first)].left.empty() ? "left" : "right") + ")";
   if (2 * static_cast<std::size_t>(count) > files.size()) throw InputError(line);
   warnings.push_back(line);
+}
+
+void add_fisheye_images(const NumberedImages& images, int first, std::vector<FramePaths>& files,
+                        const std::string& where, std::vector<std::string>& warnings) {
+  std::size_t missing = 0;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto image = images.find(first + static_cast<int>(i));
+    if (image == images.end()) {
+      ++missing;
+    } else {
+      files[i].fisheye = image->second;
+    }
+  }
+  if (missing > 0) {
+    warnings.push_back(where + ": " + std::to_string(missing) + " of " +
+                       std::to_string(files.size()) + " frames lack a fisheye image");
+  }
 }
 
 ImageSize first_image_size(const std::vector<FramePaths>& files) {

@@ -19,6 +19,7 @@ namespace hybrid_slam {
 struct FramePaths {
   std::filesystem::path left;
   std::filesystem::path right;
+  std::filesystem::path fisheye;
 };
 
 // A sequence whose images are files. Rectifies what it reads if given a rectifier.
@@ -27,7 +28,7 @@ class FileSequence : public ImageSequence {
   FileSequence(SequenceInfo info, std::vector<FramePaths> files,
                std::unique_ptr<const StereoRectifier> rectifier);
   const SequenceInfo& info() const override { return info_; }
-  StereoImages read(std::size_t frame) const override;
+  FrameImages read(std::size_t frame) const override;
 
  private:
   SequenceInfo info_;
@@ -68,6 +69,10 @@ Calibrated<RectifiedStereo> make_stereo_camera(double fx, double fy, double cx, 
                                                double baseline, ImageSize size,
                                                const std::string& source);
 
+// Adds the fisheye's images to frames that begin with number `first`; warns of those that lack one.
+void add_fisheye_images(const NumberedImages& images, int first, std::vector<FramePaths>& files,
+                        const std::string& where, std::vector<std::string>& warnings);
+
 // Throws InputError, starting with `source`, if the two sizes differ.
 void check_image_size(ImageSize image, ImageSize calibrated, const std::string& source);
 
@@ -89,6 +94,7 @@ std::unique_ptr<ImageSequence> open_kitti(const std::filesystem::path& path,
 std::unique_ptr<ImageSequence> open_euroc(const std::filesystem::path& path,
                                           const std::string& name);
 std::unique_ptr<ImageSequence> open_uwslam(const std::filesystem::path& path,
-                                           const std::string& name, TruthConvention convention);
+                                           const std::string& name, SequenceCameras cameras,
+                                           TruthConvention convention);
 
 }  // namespace hybrid_slam

@@ -13,13 +13,14 @@ namespace fs = std::filesystem;
 namespace {
 
 std::unique_ptr<ImageSequence> open_layout(const fs::path& path, SequenceLayout layout,
-                                           const std::string& name, TruthConvention convention) {
+                                           const std::string& name, SequenceCameras cameras,
+                                           TruthConvention convention) {
   const bool any = layout == SequenceLayout::kAuto;
   std::unique_ptr<ImageSequence> sequence;
   if (any || layout == SequenceLayout::kKitti) sequence = open_kitti(path, name);
   if (!sequence && (any || layout == SequenceLayout::kEuroc)) sequence = open_euroc(path, name);
   if (!sequence && (any || layout == SequenceLayout::kUwslam)) {
-    sequence = open_uwslam(path, name, convention);
+    sequence = open_uwslam(path, name, cameras, convention);
   }
   return sequence;
 }
@@ -41,11 +42,12 @@ const char* expected_files(SequenceLayout layout) {
 }  // namespace
 
 std::unique_ptr<ImageSequence> open_sequence(const std::string& path, SequenceLayout layout,
-                                             const std::string& name, TruthConvention convention) {
+                                             const std::string& name, SequenceCameras cameras,
+                                             TruthConvention convention) {
   cv::setNumThreads(1);  // OpenCV's setting is global; threads are the pipeline's to make
   try {
     if (!fs::is_directory(path)) throw InputError(path + ": no such folder");
-    auto sequence = open_layout(path, layout, name, convention);
+    auto sequence = open_layout(path, layout, name, cameras, convention);
     if (!sequence) {
       const std::string wanted = name.empty() ? "" : " of the name \"" + name + "\"";
       throw InputError(path + ": " + expected_files(layout) + wanted);

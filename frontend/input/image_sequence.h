@@ -18,12 +18,14 @@ struct StampedPose {
   Rigid3d world_from_cam;  // rotation is the identity where the dataset's truth has none
 };
 
-// One moment of a stereo sequence: rectified, row-aligned, grey.
-struct StereoImages {
+// One moment of a sequence, grey: a rectified, row-aligned pair, and what the fisheye saw.
+struct FrameImages {
   std::int64_t frame_index = 0;  // counted from 0 within the sequence as opened
   double time = 0;               // [s]
   GrayImage left;
   GrayImage right;
+  GrayImage fisheye;          // raw; empty without a fisheye, and where its image cannot be read
+  std::string fisheye_error;  // why it cannot
 };
 
 // What the dataset says about itself before any image is decoded.
@@ -31,9 +33,11 @@ struct SequenceInfo {
   std::string name;
   std::string layout;  // "kitti", "euroc" or "uwslam"
   Calibrated<RectifiedStereo> stereo;
-  std::vector<double> times;       // one per frame [s], strictly ascending
+  std::optional<Calibrated<KannalaBrandt>> fisheye;  // none: there is no such camera
+  std::vector<double> times;                         // one per frame [s], strictly ascending
   std::vector<StampedPose> truth;  // left camera; empty where there is none, ascending in time
   bool truth_has_rotation = false;
+  std::vector<StampedPose> fisheye_truth;  // likewise, of the fisheye; the world is that of `truth`
   std::string truth_convention;       // as the file was read: "world_from_cam", "cam_from_world"
   std::vector<std::string> warnings;  // one line each: what was found odd and went on without
 };
@@ -47,10 +51,15 @@ class ImageSequence {
   virtual const SequenceInfo& info() const = 0;
   std::size_t size() const { return info().times.size(); }
 
-  // Throws InputError if a file of this frame is missing, truncated, damaged or of the wrong size:
-  // the caller counts the frame as corrupt and goes on.
-  virtual StereoImages read(std::size_t frame) const = 0;
+  // Throws InputError if a stereo image of this frame is missing, truncated, damaged or of the
+  // wrong size: the caller counts the frame as corrupt and goes on. Of a fisheye image the frame
+  // says so.
+  virtual FrameImages read(std::size_t frame) const = 0;
 };
+
+// Which cameras are wanted. kHybrid where there is no fisheye: the stereo pair, with a warning.
+// kAuto: the fisheye, if there is one.
+enum class SequenceCameras { kAuto, kStereo, kHybrid };
 
 enum class SequenceLayout { kAuto, kKitti, kEuroc, kUwslam };
 
@@ -68,9 +77,11 @@ enum class TruthConvention { kAuto, kWorldFromCam, kCamFromWorld };
 // without a time, or more than half of the frames lack an image.
 // Goes on with a line in SequenceInfo::warnings if fewer frames lack an image (reading those
 // throws), if times reach beyond the images (left out), if timestamps have no partner in the other
-// camera (left out), or if the truth covers another number of frames. Truth is optional everywhere.
+// camera (left out), if the truth covers another number of frames, or if frames lack a fisheye
+// image. Truth is optional everywhere.
 std::unique_ptr<ImageSequence> open_sequence(const std::string& path, SequenceLayout layout,
                                              const std::string& name,
+                                             SequenceCameras cameras = SequenceCameras::kStereo,
                                              TruthConvention convention = TruthConvention::kAuto);
 
 }  // namespace hybrid_slam

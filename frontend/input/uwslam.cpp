@@ -1,11 +1,10 @@
 #include <algorithm>
 #include <cmath>
-
-#include <Eigen/Cholesky>
+#include <numbers>
 
 #include "cameras/calibration_file.h"
+#include "frontend/input/camera_poses.h"
 #include "frontend/input/file_sequence.h"
-#include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"
 
 // UWslam: hybrid/<sequence>/images/raw/<number>_{left,right,fish}.<png|jpg> with camera_poses.txt
@@ -17,8 +16,6 @@ namespace hybrid_slam {
 namespace fs = std::filesystem;
 
 namespace {
-
-constexpr double kClearEvidence = 2;  // ratio of implausibilities that decides
 
 bool is_uwslam_sequence(const fs::path& folder) {
   if (!fs::is_directory(folder / "images")) return false;
@@ -39,16 +36,17 @@ fs::path times_file(const fs::path& folder) {
 }
 
 struct ImageLists {
-  NumberedImages left, right;
+  NumberedImages left, right, fisheye;
 };
 
 ImageLists list_images(const fs::path& folder) {
   const fs::path raw = folder / "images" / "raw";
   const fs::path images = fs::is_directory(raw) ? raw : folder / "images";
-  ImageLists lists{list_numbered_images(images, "_left"), list_numbered_images(images, "_right")};
+  ImageLists lists{list_numbered_images(images, "_left"), list_numbered_images(images, "_right"),
+                   list_numbered_images(images, "_fish")};
   std::string left_suffix = "_left", right_suffix = "_right";
   if (lists.left.empty() && lists.right.empty()) {
-    lists = {list_numbered_images(images, "_0"), list_numbered_images(images, "_1")};
+    lists = {list_numbered_images(images, "_0"), list_numbered_images(images, "_1"), {}};
     if (!lists.left.empty() || !lists.right.empty()) left_suffix = "_0", right_suffix = "_1";
   }
   if (lists.left.empty() && lists.right.empty()) {
@@ -61,10 +59,26 @@ ImageLists list_images(const fs::path& folder) {
   return lists;
 }
 
-Calibrated<RectifiedStereo> read_calibration(const fs::path& folder) {
+fs::path calibration_folder(const fs::path& folder) {
   const fs::path own = folder / "calibration";
-  const fs::path shared = fs::absolute(folder / ".." / "calibration").lexically_normal();
-  const fs::path& place = fs::is_directory(own) ? own : shared;
+  return fs::is_directory(own) ? own
+                               : fs::absolute(folder / ".." / "calibration").lexically_normal();
+}
+
+// Size of the first image whose header can be read. Throws InputError if there is none.
+ImageSize first_readable_size(const NumberedImages& images) {
+  std::string first_error;
+  for (const auto& [number, path] : images) {
+    try {
+      return read_image_size(path);
+    } catch (const InputError& error) {
+      if (first_error.empty()) first_error = error.what();
+    }
+  }
+  throw InputError(first_error);
+}
+
+Calibrated<RectifiedStereo> read_calibration(const fs::path& place) {
   const auto camera = read_ros_stereo((place / "left_camera.yaml").string(),
                                       (place / "right_camera.yaml").string());
   const auto& [fx, fy, cx, cy, baseline] = camera.params;
@@ -72,97 +86,36 @@ Calibrated<RectifiedStereo> read_calibration(const fs::path& folder) {
                             place.string());
 }
 
-// The poses of both cameras as camera_poses.txt has them, whatever they mean.
-struct PosePair {
-  int index = 0;
-  Rigid3d fish, stereo;
-};
+// Checks it against an image, which also tells a size that the file may leave out.
+Calibrated<KannalaBrandt> read_fisheye_calibration(const fs::path& path, ImageSize image) {
+  Calibrated<KannalaBrandt> camera = read_fisheye(path.string());
+  if (camera.width == 0) {
+    camera.width = image.width;
+    camera.height = image.height;
+  }
+  check_image_size(image, {camera.width, camera.height}, path.string());
+  constexpr double kMinAngle = 60;  // [deg] to the axis
+  const double max_angle = KannalaBrandt::max_angle(camera.params.data()) * 180 / std::numbers::pi;
+  if (!(max_angle >= kMinAngle)) {
+    throw InputError(path.string() + ": k1 to k4: the field of view folds at " +
+                     std::to_string(static_cast<int>(max_angle)) + " degrees from the axis");
+  }
+  return camera;
+}
 
-std::vector<PosePair> read_pose_pairs(const fs::path& path, std::size_t frame_count) {
-  std::vector<PosePair> poses;
-  for (const NumberRow& row : read_number_rows(path, ' ')) {
-    const std::vector<double>& v = row.values;
-    if (v.size() != 15) {
-      throw line_error(path, row.line, "expected 15 numbers, found " + std::to_string(v.size()));
+// The fisheye, if it is wanted and there is one.
+void add_fisheye(const fs::path& folder, const NumberedImages& images, SequenceCameras cameras,
+                 NumberedFrames& frames, SequenceInfo& info) {
+  if (cameras == SequenceCameras::kStereo) return;
+  if (images.empty()) {
+    if (cameras == SequenceCameras::kHybrid) {
+      info.warnings.push_back(folder.string() + ": holds no fisheye images <number>_fish");
     }
-    if (!(v[0] >= 0 && v[0] < static_cast<double>(frame_count) && v[0] == std::floor(v[0]))) {
-      throw line_error(path, row.line, "no time belongs to this index");
-    }
-    PosePair pair;
-    pair.index = static_cast<int>(v[0]);
-    if (!poses.empty() && pair.index <= poses.back().index) {
-      throw line_error(path, row.line, "indices are not strictly ascending");
-    }
-    pair.fish = Rigid3d(checked_rotation(v[4], v[5], v[6], v[7], path, row.line),
-                        Eigen::Vector3d(v[1], v[2], v[3]));
-    pair.stereo = Rigid3d(checked_rotation(v[11], v[12], v[13], v[14], path, row.line),
-                          Eigen::Vector3d(v[8], v[9], v[10]));
-    poses.push_back(pair);
+    return;
   }
-  return poses;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-// How little the poses look like those of two cameras on one vehicle: the distance between the two
-// [m], times the angle by which their optical axes miss the point that all axes miss least [rad];
-// medians. A pose read the wrong way round scatters the axes, and puts the camera's rotation, times
-// its distance from the world's origin, into its position.
-double implausibility(const std::vector<PosePair>& poses, bool invert) {
-  std::vector<double> distances, angles;
-  std::vector<Rigid3d> cameras;
-  for (const PosePair& pair : poses) {
-    cameras.push_back(invert ? inverse(pair.fish) : pair.fish);
-    cameras.push_back(invert ? inverse(pair.stereo) : pair.stereo);
-    const Eigen::Vector3d fish = cameras[cameras.size() - 2].translation();
-    distances.push_back((fish - cameras.back().translation()).norm());
-  }
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Rigid3d& world_from_cam : cameras) {
-    const Eigen::Vector3d axis = world_from_cam.rotation() * Eigen::Vector3d::UnitZ();
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
-    normal += across;
-    sum += across * world_from_cam.translation();
-  }
-  const Eigen::Vector3d point_in_world = normal.ldlt().solve(sum);
-  for (const Rigid3d& world_from_cam : cameras) {
-    const Eigen::Vector3d point = inverse(world_from_cam) * point_in_world;
-    angles.push_back(std::atan2(point.head<2>().norm(), point.z()));
-  }
-  return median(std::move(distances)) * median(std::move(angles));
-}
-
-// Whether the poses are cam_from_world. Without clear evidence (a world whose origin is a camera
-// that hardly moves looks alike both ways) they are what the dataset's description says.
-bool is_cam_from_world(const std::vector<PosePair>& poses, const fs::path& path,
-                       std::vector<std::string>& warnings) {
-  const double inverted = implausibility(poses, true);
-  const double direct = implausibility(poses, false);
-  if (!(kClearEvidence * std::min(inverted, direct) <= std::max(inverted, direct))) {
-    warnings.push_back(path.string() +
-                       ": the poses fit both conventions; took them as world_from_cam");
-    return false;
-  }
-  return inverted < direct;
-}
-
-void read_camera_poses(const fs::path& path, const std::vector<double>& times,
-                       TruthConvention convention, SequenceInfo& info) {
-  const std::vector<PosePair> poses = read_pose_pairs(path, times.size());
-  bool invert = convention == TruthConvention::kCamFromWorld;
-  if (convention == TruthConvention::kAuto) invert = is_cam_from_world(poses, path, info.warnings);
-  info.truth_convention = invert ? "cam_from_world" : "world_from_cam";
-  for (const PosePair& pair : poses) {
-    info.truth.push_back(
-        {times[static_cast<std::size_t>(pair.index)], invert ? inverse(pair.stereo) : pair.stereo});
-  }
-  info.truth_has_rotation = !info.truth.empty();
+  add_fisheye_images(images, frames.first, frames.files, folder.string(), info.warnings);
+  info.fisheye = read_fisheye_calibration(calibration_folder(folder) / "fisheye_calib.yaml",
+                                          first_readable_size(images));
 }
 
 // Positions only: "timestamp x y z", or "x y z" with row n belonging to index n.
@@ -195,7 +148,7 @@ void read_positions(const fs::path& path, const std::vector<double>& times, Sequ
 }  // namespace
 
 std::unique_ptr<ImageSequence> open_uwslam(const fs::path& path, const std::string& name,
-                                           TruthConvention convention) {
+                                           SequenceCameras cameras, TruthConvention convention) {
   SequenceInfo info;
   const auto folder = choose_folder(path, name, info.warnings);
   if (!folder) return nullptr;
@@ -205,11 +158,17 @@ std::unique_ptr<ImageSequence> open_uwslam(const fs::path& path, const std::stri
   const fs::path times_path = times_file(*folder);
   const std::vector<double> times = read_times(times_path);
   NumberedFrames frames = match_frames(times, times_path, images.left, images.right, info.warnings);
-  info.stereo = read_calibration(*folder);
+  info.stereo = read_calibration(calibration_folder(*folder));
   check_image_size(first_image_size(frames.files), {info.stereo.width, info.stereo.height},
                    folder->string() + ": calibration");
+  add_fisheye(*folder, images.fisheye, cameras, frames, info);
   if (fs::exists(*folder / "camera_poses.txt")) {
-    read_camera_poses(*folder / "camera_poses.txt", times, convention, info);
+    CameraPoses poses = read_camera_poses(*folder / "camera_poses.txt", times, convention);
+    info.truth = std::move(poses.stereo);
+    info.fisheye_truth = std::move(poses.fisheye);
+    info.truth_has_rotation = !info.truth.empty();
+    info.truth_convention = std::move(poses.convention);
+    info.warnings.insert(info.warnings.end(), poses.warnings.begin(), poses.warnings.end());
   } else if (fs::exists(*folder / "gt_poses.txt")) {
     read_positions(*folder / "gt_poses.txt", times, info);
   }

@@ -17,6 +17,12 @@ int weighted_observations(const MapSnapshot& map, const Landmark& landmark) {
   return count;
 }
 
+// The size of the landmark's image in a keyframe, comparable between cameras.
+double normalized_scale(const MapSnapshot& map, const Keyframe& keyframe, std::size_t keypoint) {
+  return keyframe.observations->features.keypoints[keypoint].scale /
+         focal_length(map.camera(keyframe));
+}
+
 // Do enough other keyframes, all but `erased`, see the landmark at the same or a finer scale?
 bool seen_elsewhere(const MapSnapshot& map, const Landmark& landmark, KeyframeId keyframe,
                     double scale, const std::vector<KeyframeId>& erased, int enough) {
@@ -26,8 +32,8 @@ bool seen_elsewhere(const MapSnapshot& map, const Landmark& landmark, KeyframeId
         std::find(erased.begin(), erased.end(), observation.keyframe) != erased.end()) {
       continue;
     }
-    const auto& features = map.at(observation.keyframe).observations->features;
-    if (features.keypoints[observation.keypoint].scale <= kSameScale * scale &&
+    if (normalized_scale(map, map.at(observation.keyframe), observation.keypoint) <=
+            kSameScale * scale &&
         ++observers >= enough) {
       return true;
     }
@@ -50,7 +56,7 @@ bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
       continue;
     }
     ++counted;
-    const double scale = keyframe.observations->features.keypoints[i].scale;
+    const double scale = normalized_scale(map, keyframe, i);
     redundant +=
         seen_elsewhere(map, *landmark, keyframe.id, scale, erased, options.redundant_observers) ? 1
                                                                                                 : 0;

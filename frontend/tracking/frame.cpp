@@ -11,4 +11,20 @@ Frame make_frame(std::int64_t index, double time, StereoFeatures features, int w
           nullptr, 0,    Rigid3d(),           std::vector<LandmarkId>(size)};
 }
 
+Frame make_mono_frame(std::int64_t index, double time, FeatureSet features, int width, int height) {
+  StereoFeatures single;
+  single.left = std::move(features);
+  return make_frame(index, time, std::move(single), width, height);
+}
+
+std::shared_ptr<FrameObservations> make_observations(CameraId camera, const Frame& frame) {
+  auto observations = std::make_shared<FrameObservations>();
+  observations->camera = camera;
+  observations->frame_index = frame.index;
+  observations->time = frame.time;
+  observations->features = frame.features.left;
+  observations->u_right = frame.features.u_right;
+  return observations;
+}
+
 }  // namespace hybrid_slam

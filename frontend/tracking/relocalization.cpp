@@ -184,14 +184,23 @@ std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const Fea
   return observations;
 }
 
+std::vector<KeyframeId> newest_keyframes(const MapSnapshot& map, int count) {
+  std::vector<KeyframeId> ids = map.keyframe_ids();
+  std::reverse(ids.begin(), ids.end());
+  ids.resize(std::min(ids.size(), static_cast<std::size_t>(count)));
+  return ids;
+}
+
 std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const FeatureView& view,
+                                           std::span<const KeyframeId> keyframes,
                                            const ProjectionMatcherOptions& matcher,
                                            const PoseRefinementOptions& pose,
                                            const RelocalizationOptions& options) {
-  const std::vector<KeyframeId> ids = map.keyframe_ids();
-  const std::size_t count = std::min(ids.size(), static_cast<std::size_t>(options.max_keyframes));
-  for (std::size_t i = 0; i < count; ++i) {
-    auto found = try_keyframe(map, view, ids[ids.size() - 1 - i], matcher, pose, options);
+  for (const KeyframeId keyframe : keyframes) {
+    if (map.find(keyframe) == nullptr) {
+      continue;
+    }
+    auto found = try_keyframe(map, view, keyframe, matcher, pose, options);
     if (found) {
       return found;
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,7 @@
 namespace hybrid_slam {
 
 struct RelocalizationOptions {
-  int max_keyframes = 50;  // newest first
+  int max_keyframes = 50;  // newest first, where nothing else is known
   double ratio = 0.75;     // best against second best descriptor
   double max_descriptor_distance = 0.7;
   int min_matches = 15;
@@ -44,9 +45,14 @@ std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const Fea
                                                const std::vector<LandmarkId>& landmarks,
                                                std::vector<std::size_t>& keypoint);
 
-// Finds an image in the map without any prediction: descriptors against keyframe after keyframe,
-// PnP in RANSAC, guided search. None if no keyframe yields min_inliers.
+// The newest keyframes, at most `count` of them, newest first.
+std::vector<KeyframeId> newest_keyframes(const MapSnapshot& map, int count);
+
+// Finds an image in the map without any prediction: descriptors against one of `keyframes` after
+// the other, PnP in RANSAC, guided search. None if no keyframe yields min_inliers; ids that are not
+// in the map are passed over.
 std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const FeatureView& view,
+                                           std::span<const KeyframeId> keyframes,
                                            const ProjectionMatcherOptions& matcher,
                                            const PoseRefinementOptions& pose,
                                            const RelocalizationOptions& options);

@@ -57,13 +57,6 @@ int count_well_founded(const MapSnapshot& map, KeyframeId id) {
 
 NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,
                                  KeyframeId reference, double close_depth, int min_new_points) {
-  auto observations = std::make_shared<FrameObservations>();
-  observations->camera = camera_id;
-  observations->frame_index = frame.index;
-  observations->time = frame.time;
-  observations->features = frame.features.left;
-  observations->u_right = frame.features.u_right;
-
   struct Candidate {
     std::uint32_t index;
     Eigen::Vector3d point;  // in the camera
@@ -79,7 +72,7 @@ NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const
       candidates.begin(), candidates.end(),
       [](const Candidate& a, const Candidate& b) { return a.point.z() < b.point.z(); });
   NewKeyframe keyframe{
-      std::move(observations), frame.cam_from_world, frame.landmarks, {}, reference};
+      make_observations(camera_id, frame), frame.cam_from_world, frame.landmarks, {}, reference};
   const Rigid3d world_from_cam = inverse(frame.cam_from_world);
   for (const Candidate& candidate : candidates) {
     if (candidate.point.z() > close_depth &&

@@ -15,41 +15,22 @@ int count_valid(const std::vector<LandmarkId>& ids) {
       std::count_if(ids.begin(), ids.end(), [](LandmarkId id) { return id.valid(); }));
 }
 
-std::vector<LandmarkId> valid_ids(const std::vector<LandmarkId>& ids) {
-  std::vector<LandmarkId> valid;
-  std::copy_if(ids.begin(), ids.end(), std::back_inserter(valid),
-               [](LandmarkId id) { return id.valid(); });
-  return valid;
-}
-
-void assign(const std::vector<ProjectionMatch>& matches, Frame& frame) {
-  for (const ProjectionMatch& match : matches) {
-    frame.landmarks[static_cast<std::size_t>(match.keypoint)] = match.landmark;
-  }
-}
-
 void clear(Frame& frame) { frame.landmarks.assign(frame.size(), LandmarkId()); }
 
 }  // namespace
 
 std::string StereoTrackerOptions::validate() const {
-  if (max_features < 1) {
-    return "tracking: max_features must be positive";
-  }
-  for (const double value :
-       {min_initial_share, close_baselines, last_frame_radius, local_map_radius}) {
+  for (const double value : {min_initial_share, close_baselines, last_frame_radius}) {
     if (!(value > 0)) {
-      return "tracking: min_initial_share, radii and close_baselines must be positive";
+      return "tracking: min_initial_share, last_frame_radius and close_baselines must be positive";
     }
   }
   if (!(last_frame_retry_share >= 0) || !(last_frame_min_share >= 0) || min_new_points < 0 ||
-      min_reference_matches < 0 || min_pose_inliers < 6 || min_local_map_inliers < 6 ||
-      min_odometer_inliers < 6) {
+      min_reference_matches < 0 || min_pose_inliers < 6 || min_odometer_inliers < 6) {
     return "tracking: shares and counts must not be negative, counts of inliers at least 6";
   }
   for (const std::string& error :
-       {odometer.validate(), disparity.validate(), matcher.validate(), local_map.validate(),
-        relocalization.validate(), keyframes.validate(), refinement.validate()}) {
+       {TrackerOptions::validate(), odometer.validate(), disparity.validate()}) {
     if (!error.empty()) {
       return error;
     }
@@ -60,12 +41,12 @@ std::string StereoTrackerOptions::validate() const {
 StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStereo>& camera,
                              const StereoTrackerOptions& options)
     : camera_id_(camera_id),
-      stereo_(camera),
       camera_(camera),
       options_(options),
       odometer_(camera, options.odometer),
       disparity_(camera, options.disparity),
-      refiner_(camera_id, camera, options.refinement) {
+      matcher_(camera_id, camera, options),
+      last_(camera_id) {
   const std::string error = options.validate();
   if (!error.empty()) {
     throw std::invalid_argument(error);
@@ -75,16 +56,15 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
 TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allow_keyframe) {
   if (!map.origin().valid()) {
     TrackedFrame result = initialize(frame);
-    remember(std::move(frame), result);
-    return result;
+    return remember(std::move(frame), std::move(result));
   }
-  follow_map(map);
+  last_.follow(map);
   correct_disparities(frame);
   TrackedFrame result;
   result.frame_index = frame.index;
   result.time = frame.time;
   result.disparity_offset = frame.u_right_correction;
-  if (last_tracked_) {
+  if (last_.tracked()) {
     predict(frame, result);
     const Rigid3d predicted = frame.cam_from_world;
     if (!track_last_frame(frame, map, result)) {
@@ -98,43 +78,23 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
       result.source = PoseSource::kLocalMap;
     } else if (result.odometer_inliers >= options_.min_odometer_inliers) {
       frame.cam_from_world = predicted;
+      result.reference = last_.reference();
       result.source = PoseSource::kOdometer;
     }
-  } else if (relocalize(frame, map, result)) {
+  } else if (matcher_.relocalize(map, newest_keyframes(map, options_.relocalization.max_keyframes),
+                                 frame) &&
+             track_local_map(frame, map, options_.relocalization.min_inliers, result)) {
     result.source = PoseSource::kRelocalization;
   }
   if (result.tracked()) {
     result.cam_from_world = frame.cam_from_world;
-    result.reference = reference_;
-    result.cam_from_reference = frame.cam_from_world * inverse(map.cam_from_world(reference_));
-    if (allow_keyframe && !requested_keyframe_ && wants_keyframe(frame, map, result)) {
-      result.keyframe = make_keyframe(frame);
+    result.cam_from_reference =
+        frame.cam_from_world * inverse(map.cam_from_world(result.reference));
+    if (allow_keyframe && !last_.waits_for_keyframe() && wants_keyframe(frame, map, result)) {
+      result.keyframe = make_keyframe(frame, result.reference);
     }
   }
-  remember(std::move(frame), result);
-  return result;
-}
-
-// The map has moved on since the last frame: a keyframe that was asked for may be in it, and the
-// reference may have been corrected.
-void StereoTracker::follow_map(const MapSnapshot& map) {
-  if (!last_tracked_ || !last_) {
-    return;
-  }
-  if (requested_keyframe_) {
-    const Keyframe* keyframe = map.find_frame(camera_id_, *requested_keyframe_);
-    if (keyframe != nullptr && last_->index == *requested_keyframe_) {
-      reference_ = keyframe->id;
-      last_->landmarks = keyframe->landmarks;
-      last_from_reference_ = Rigid3d();
-    }
-    if (map.newest_frame_index() >= *requested_keyframe_) {
-      requested_keyframe_.reset();
-    }
-  }
-  if (reference_.valid()) {
-    last_->cam_from_world = last_from_reference_ * map.cam_from_world(reference_);
-  }
+  return remember(std::move(frame), std::move(result));
 }
 
 TrackedFrame StereoTracker::initialize(Frame& frame) const {
@@ -149,7 +109,7 @@ TrackedFrame StereoTracker::initialize(Frame& frame) const {
     return result;
   }
   result.source = PoseSource::kInitialization;
-  result.keyframe = make_keyframe(frame);
+  result.keyframe = make_keyframe(frame, KeyframeId());
   return result;
 }
 
@@ -162,124 +122,64 @@ void StereoTracker::correct_disparities(Frame& frame) const {
 
 // Odometer and predicted pose; constant velocity, then the last pose, where the odometer fails.
 void StereoTracker::predict(Frame& frame, TrackedFrame& result) {
-  const auto motion = odometer_.estimate(last_->features, frame.features);
+  const Frame& last = last_.frame();
+  const auto motion = odometer_.estimate(last.features, frame.features);
   if (motion) {
     result.prediction = Prediction::kOdometer;
     result.odometer_inliers = static_cast<int>(motion->inliers.size());
-    frame.cam_from_world = motion->current_from_previous * last_->cam_from_world;
-    disparity_.add(last_->features, last_->u_right_correction, frame.features,
-                   frame.u_right_correction, *motion);
-  } else if (velocity_) {
+    frame.cam_from_world = motion->current_from_previous * last.cam_from_world;
+    disparity_.add(last.features, last.u_right_correction, frame.features, frame.u_right_correction,
+                   *motion);
+  } else if (last_.velocity()) {
     result.prediction = Prediction::kConstantVelocity;
-    frame.cam_from_world = *velocity_ * last_->cam_from_world;
+    frame.cam_from_world = *last_.velocity() * last.cam_from_world;
   } else {
     result.prediction = Prediction::kLastPose;
-    frame.cam_from_world = last_->cam_from_world;
+    frame.cam_from_world = last.cam_from_world;
   }
 }
 
 bool StereoTracker::track_last_frame(Frame& frame, const MapSnapshot& map,
                                      TrackedFrame& result) const {
-  const std::vector<LandmarkId> ids = valid_ids(last_->landmarks);
-  ProjectionMatcherOptions matcher = options_.matcher;
-  const auto predictions =
-      predict_landmarks(map, camera_, frame.cam_from_world, ids, matcher.max_view_angle_deg);
-  matcher.radius = options_.last_frame_radius;
-  auto matches = match_predictions(map, view_of(frame), predictions, nullptr, matcher);
-  if (static_cast<int>(matches.size()) <
-      share_of_features(frame, options_.last_frame_retry_share)) {
-    matcher.radius *= 2;
-    matches = match_predictions(map, view_of(frame), predictions, nullptr, matcher);
+  const std::vector<LandmarkId> ids = valid_ids(last_.frame().landmarks);
+  const double radius = options_.last_frame_radius;
+  int matched = matcher_.match_projections(map, ids, radius, frame);
+  if (matched < share_of_features(frame, options_.last_frame_retry_share)) {
+    matched = matcher_.match_projections(map, ids, 2 * radius, frame);
   }
-  clear(frame);
-  if (static_cast<int>(matches.size()) < share_of_features(frame, options_.last_frame_min_share)) {
+  if (matched < share_of_features(frame, options_.last_frame_min_share)) {
+    clear(frame);
     return false;
   }
-  assign(matches, frame);
-  result.last_frame_inliers = refine(frame, map);
+  result.last_frame_inliers = matcher_.refine(map, frame);
   return result.last_frame_inliers >= options_.min_pose_inliers;
 }
 
 bool StereoTracker::track_reference(Frame& frame, const MapSnapshot& map) const {
-  if (map.find(reference_) == nullptr) {
+  if (map.find(last_.reference()) == nullptr) {
     return false;
   }
   frame.landmarks =
-      match_keyframe(map, reference_, frame.features.left, options_.relocalization.ratio,
+      match_keyframe(map, last_.reference(), frame.features.left, options_.relocalization.ratio,
                      options_.relocalization.max_descriptor_distance);
   return count_valid(frame.landmarks) >= options_.min_reference_matches &&
-         refine(frame, map) >= options_.min_pose_inliers;
+         matcher_.refine(map, frame) >= options_.min_pose_inliers;
 }
 
 bool StereoTracker::track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers,
-                                    TrackedFrame& result) {
+                                    TrackedFrame& result) const {
   std::vector<LandmarkId> seeds = valid_ids(frame.landmarks);
   if (seeds.empty()) {
-    seeds = valid_ids(last_->landmarks);
+    seeds = valid_ids(last_.frame().landmarks);
   }
-  const LocalMap local = make_local_map(map, seeds, options_.local_map);
-  if (!local.reference.valid()) {
+  auto match = matcher_.match_local_map(map, seeds, min_inliers, frame);
+  if (!match) {
     return false;
   }
-  const auto predictions = predict_landmarks(map, camera_, frame.cam_from_world, local.landmarks,
-                                             options_.matcher.max_view_angle_deg);
-  std::vector<LandmarkId> matched = valid_ids(frame.landmarks);
-  std::sort(matched.begin(), matched.end());
-  std::vector<char> taken(frame.size(), 0);
-  std::transform(frame.landmarks.begin(), frame.landmarks.end(), taken.begin(),
-                 [](LandmarkId id) { return static_cast<char>(id.valid()); });
-  std::vector<LandmarkPrediction> open;
-  for (const LandmarkPrediction& prediction : predictions) {
-    result.counts.visible.push_back(prediction.id);
-    if (!std::binary_search(matched.begin(), matched.end(), prediction.id)) {
-      open.push_back(prediction);
-    }
-  }
-  ProjectionMatcherOptions matcher = options_.matcher;
-  matcher.radius = options_.local_map_radius;
-  assign(match_predictions(map, view_of(frame), open, &taken, matcher), frame);
-  refine(frame, map);
-  if (refiner_.refine(map, frame) > 0) {
-    refine(frame, map);
-  }
-  result.inliers = count_valid(frame.landmarks);
-  if (result.inliers < min_inliers) {
-    result.counts = {};
-    return false;
-  }
-  result.counts.found = valid_ids(frame.landmarks);
-  reference_ = local.reference;
+  result.reference = match->reference;
+  result.inliers = match->inliers;
+  result.counts = std::move(match->counts);
   return true;
-}
-
-bool StereoTracker::relocalize(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
-  const auto found = hybrid_slam::relocalize(map, view_of(frame), options_.matcher, options_.pose,
-                                             options_.relocalization);
-  if (!found) {
-    return false;
-  }
-  frame.cam_from_world = found->cam_from_world;
-  frame.landmarks = found->landmarks;
-  reference_ = found->keyframe;
-  return track_local_map(frame, map, options_.relocalization.min_inliers, result);
-}
-
-// Optimises the frame's pose on the landmarks it has and drops those that disagree. Returns how
-// many are left.
-int StereoTracker::refine(Frame& frame, const MapSnapshot& map) const {
-  std::vector<std::size_t> keypoint;
-  const auto observations = pose_observations(map, frame.features.left, frame.features.u_right,
-                                              frame.landmarks, keypoint);
-  const auto refined = refine_pose(camera_, frame.cam_from_world, observations, options_.pose);
-  std::vector<LandmarkId> kept(frame.size());
-  for (std::size_t i = 0; i < keypoint.size(); ++i) {
-    if (refined.inlier[i]) {
-      kept[keypoint[i]] = frame.landmarks[keypoint[i]];
-    }
-  }
-  frame.landmarks = std::move(kept);
-  frame.cam_from_world = refined.cam_from_world;
-  return refined.inliers;
 }
 
 bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
@@ -290,23 +190,19 @@ bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   }
   KeyframeEvidence evidence;
   evidence.inliers = result.inliers;
-  evidence.reference_landmarks = count_well_founded(map, reference_);
+  evidence.reference_landmarks = count_well_founded(map, result.reference);
   evidence.close_tracked = coverage->close_tracked;
   evidence.close_untracked = coverage->close_untracked;
-  evidence.frames_since_keyframe = static_cast<int>(frame.index - last_keyframe_frame_);
+  evidence.frames_since_keyframe = static_cast<int>(frame.index - last_.keyframe_frame());
   evidence.keyframes = map.keyframe_count();
   evidence.motion = result.cam_from_reference.translation().norm() / coverage->median_depth;
   evidence.by_odometry = result.source == PoseSource::kOdometer;
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);
 }
 
-NewKeyframe StereoTracker::make_keyframe(const Frame& frame) const {
-  return make_stereo_keyframe(camera_id_, camera_, frame, reference_, close_depth(),
+NewKeyframe StereoTracker::make_keyframe(const Frame& frame, KeyframeId reference) const {
+  return make_stereo_keyframe(camera_id_, camera_, frame, reference, close_depth(),
                               options_.min_new_points);
-}
-
-FeatureView StereoTracker::view_of(const Frame& frame) const {
-  return {camera_, frame.features.left, frame.features.u_right, frame.grid};
 }
 
 int StereoTracker::share_of_features(const Frame& frame, double share) const {
@@ -314,19 +210,12 @@ int StereoTracker::share_of_features(const Frame& frame, double share) const {
       share * std::min<double>(options_.max_features, static_cast<double>(frame.size())));
 }
 
-void StereoTracker::remember(Frame frame, const TrackedFrame& result) {
-  velocity_.reset();
-  if (result.tracked() && last_tracked_ && last_) {
-    velocity_ = frame.cam_from_world * inverse(last_->cam_from_world);
-  }
+TrackedFrame StereoTracker::remember(Frame frame, TrackedFrame result) {
   if (result.keyframe) {
-    requested_keyframe_ = frame.index;
-    last_keyframe_frame_ = frame.index;
-    refiner_.remember(frame);
+    matcher_.remember_keyframe(frame);
   }
-  last_from_reference_ = result.cam_from_reference;
-  last_tracked_ = result.tracked();
-  last_ = std::move(frame);
+  last_.remember(std::move(frame), result);
+  return result;
 }
 
 }  // namespace hybrid_slam

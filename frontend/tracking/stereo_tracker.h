@@ -5,21 +5,16 @@
 #include <vector>
 
 #include "backend/map/map_snapshot.h"
-#include "frontend/matching/projection_matcher.h"
 #include "frontend/odometry/disparity_calibrator.h"
 #include "frontend/odometry/stereo_odometer.h"
-#include "frontend/pose/pose_refinement.h"
 #include "frontend/tracking/frame.h"
-#include "frontend/tracking/keyframe_policy.h"
-#include "frontend/tracking/local_map.h"
-#include "frontend/tracking/relocalization.h"
-#include "frontend/tracking/track_refinement.h"
+#include "frontend/tracking/last_frame.h"
+#include "frontend/tracking/map_matcher.h"
 #include "frontend/tracking/tracked_frame.h"
 
 namespace hybrid_slam {
 
-struct StereoTrackerOptions {
-  int max_features = 2000;          // N below
+struct StereoTrackerOptions : TrackerOptions {
   double min_initial_share = 0.08;  // of N: features, and features with depth, to start the map
   double close_baselines = 40;   // nearer than this many baselines, one stereo pair fixes a point
   int min_new_points = 100;      // a keyframe makes at least the nearest ones
@@ -28,17 +23,9 @@ struct StereoTrackerOptions {
   double last_frame_min_share = 0.06;    // of N
   int min_reference_matches = 30;
   int min_pose_inliers = 10;
-  double local_map_radius = 3;  // [px]
-  int min_local_map_inliers = 30;
   int min_odometer_inliers = 20;  // to go on by odometry where the map does not hold
   StereoOdometerOptions odometer;
   DisparityCalibratorOptions disparity;
-  ProjectionMatcherOptions matcher;
-  PoseRefinementOptions pose;
-  LocalMapOptions local_map;
-  KeyframePolicyOptions keyframes;
-  RelocalizationOptions relocalization;
-  TrackRefinementOptions refinement;
 
   std::string validate() const;
 };
@@ -56,38 +43,26 @@ class StereoTracker {
   TrackedFrame track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);
 
  private:
-  void follow_map(const MapSnapshot& map);
   TrackedFrame initialize(Frame& frame) const;
   void correct_disparities(Frame& frame) const;
   void predict(Frame& frame, TrackedFrame& result);
   bool track_last_frame(Frame& frame, const MapSnapshot& map, TrackedFrame& result) const;
   bool track_reference(Frame& frame, const MapSnapshot& map) const;
-  bool track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers, TrackedFrame& result);
-  bool relocalize(Frame& frame, const MapSnapshot& map, TrackedFrame& result);
-  int refine(Frame& frame, const MapSnapshot& map) const;
+  bool track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers,
+                       TrackedFrame& result) const;
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
-  NewKeyframe make_keyframe(const Frame& frame) const;
-  FeatureView view_of(const Frame& frame) const;
+  NewKeyframe make_keyframe(const Frame& frame, KeyframeId reference) const;
   double close_depth() const { return options_.close_baselines * baseline(camera_); }
   int share_of_features(const Frame& frame, double share) const;
-  void remember(Frame frame, const TrackedFrame& result);
+  TrackedFrame remember(Frame frame, TrackedFrame result);
 
   CameraId camera_id_;
-  Calibrated<RectifiedStereo> stereo_;
   Camera camera_;
   StereoTrackerOptions options_;
   StereoOdometer odometer_;
   DisparityCalibrator disparity_;
-  TrackRefiner refiner_;
-
-  std::optional<Frame> last_;  // the previous frame, tracked or not
-  bool last_tracked_ = false;
-  KeyframeId reference_;  // of the last tracked frame
-  Rigid3d last_from_reference_;
-  std::optional<Rigid3d> velocity_;  // current_from_previous of the last step
-  std::optional<std::int64_t>
-      requested_keyframe_;  // frame asked to become one, not yet seen in the map
-  std::int64_t last_keyframe_frame_ = 0;
+  MapMatcher matcher_;
+  LastFrame last_;
 };
 
 }  // namespace hybrid_slam

@@ -60,10 +60,10 @@ TrackRefiner::TrackRefiner(CameraId camera_id, const Camera& camera,
     : camera_id_(camera_id), camera_(camera), options_(options) {}
 
 void TrackRefiner::remember(const Frame& frame) {
-  if (!options_.enabled || !frame.left) {
+  if (!options_.enabled || !frame.image) {
     return;
   }
-  images_.emplace_back(frame.index, frame.left);
+  images_.emplace_back(frame.index, frame.image);
   if (images_.size() > static_cast<std::size_t>(options_.keyframes)) {
     images_.pop_front();
   }
@@ -120,7 +120,7 @@ bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landm
   }
   Keypoint& keypoint = frame.features.left.keypoints[index];
   const Alignment aligned = align_patch(
-      *patch, *frame.left, *warp, Eigen::Vector2d(keypoint.x, keypoint.y), options_.alignment);
+      *patch, *frame.image, *warp, Eigen::Vector2d(keypoint.x, keypoint.y), options_.alignment);
   if (!aligned.converged) {
     return false;
   }
@@ -136,7 +136,7 @@ bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landm
 
 int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) const {
   int refined = 0;
-  if (!options_.enabled || !frame.left) {
+  if (!options_.enabled || !frame.image) {
     return refined;
   }
   for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {

@@ -27,12 +27,23 @@ inline StereoFeatures stereo_features(const FrameObservations& observations) {
   return features;
 }
 
-// A frame of a scene whose first camera is a stereo pair, ready to be tracked.
-inline Frame stereo_frame(const SyntheticScene& scene, std::size_t index) {
-  const FrameObservations& observations = *scene.frames[index].observations;
-  const Camera& camera = scene.cameras.front();
+// A stereo frame of a scene, ready to be tracked.
+inline Frame stereo_frame(const SyntheticFrame& frame, const Camera& camera) {
+  const FrameObservations& observations = *frame.observations;
   return make_frame(observations.frame_index, observations.time, stereo_features(observations),
                     image_width(camera), image_height(camera));
+}
+
+// A fisheye's.
+inline Frame mono_frame(const SyntheticFrame& frame, const Camera& camera) {
+  const FrameObservations& observations = *frame.observations;
+  return make_mono_frame(observations.frame_index, observations.time, observations.features,
+                         image_width(camera), image_height(camera));
+}
+
+// A frame of a scene that has a stereo pair only.
+inline Frame stereo_frame(const SyntheticScene& scene, std::size_t index) {
+  return stereo_frame(scene.frames[index], scene.cameras.front());
 }
 
 }  // namespace hybrid_slam

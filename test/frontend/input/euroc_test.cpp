@@ -155,8 +155,7 @@ TEST_CASE("EuRoC images are rectified: points fall where the calibration and the
   for (const StampedPose& truth : {info.truth[0], info.truth[4]}) {
     const auto frame = std::find(info.times.begin(), info.times.end(), truth.time);
     REQUIRE(frame != info.times.end());
-    const StereoImages images =
-        sequence->read(static_cast<std::size_t>(frame - info.times.begin()));
+    const FrameImages images = sequence->read(static_cast<std::size_t>(frame - info.times.begin()));
     for (const Eigen::Vector3d& point_in_world : scene()) {
       const Eigen::Vector3d point = inverse(truth.world_from_cam) * point_in_world;
       const Eigen::Vector2d left(fx * point.x() / point.z() + cx, fy * point.y() / point.z() + cy);

@@ -55,7 +55,7 @@ TEST_CASE("a KITTI dataset opens from its root, its sequences and the sequence")
     CHECK(info.truth[4].time == Approx(2));
     const Eigen::Vector3d moved = info.truth[4].world_from_cam * Eigen::Vector3d(1, 0, 0);
     CHECK((moved - Eigen::Vector3d(4, 3, 3)).norm() < 1e-12);
-    const StereoImages images = sequence->read(5);
+    const FrameImages images = sequence->read(5);
     CHECK(images.frame_index == 5);
     CHECK(images.time == Approx(2.5));
     CHECK(holds(images.left, test_picture(60, 40, 10)));

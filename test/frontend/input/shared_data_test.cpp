@@ -17,7 +17,7 @@ std::optional<std::string> data_folder() {
 }
 
 // Mean absolute difference between rows of the two images where they match best along the row.
-double row_mismatch(const StereoImages& images, int row_offset) {
+double row_mismatch(const FrameImages& images, int row_offset) {
   double sum = 0;
   int count = 0;
   const int window = 15, max_disparity = 60;
@@ -66,7 +66,7 @@ TEST_CASE("the shared EuRoC sequence is row-aligned once rectified") {
   const auto sequence = open_sequence(*data + "/euroc_backyard", SequenceLayout::kAuto, "");
   CHECK(sequence->size() == 191);
   CHECK(sequence->info().stereo.params[4] == Approx(0.12).margin(1e-3));
-  const StereoImages images = sequence->read(100);
+  const FrameImages images = sequence->read(100);
   for (const int offset : {-3, -2, 2, 3}) {
     CHECK(row_mismatch(images, 0) < row_mismatch(images, offset));
   }

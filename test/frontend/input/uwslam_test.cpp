@@ -151,8 +151,8 @@ TEST_CASE("the convention of camera_poses.txt is found or told") {
   write_hybrid(folder.path());
   const fs::path file = folder.path() / "hybrid/M1/camera_poses.txt";
   const auto first_truth = [&](TruthConvention convention, const char* expected) {
-    const auto sequence =
-        open_sequence(folder.path().string(), SequenceLayout::kAuto, "M1", convention);
+    const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "M1",
+                                        SequenceCameras::kStereo, convention);
     CHECK(sequence->info().truth_convention == expected);
     return Eigen::Vector3d(sequence->info().truth[0].world_from_cam.translation());
   };
@@ -250,6 +250,83 @@ TEST_CASE("a UWslam dataset that cannot be used is refused with one line") {
   const std::string line = open_complaint(folder.path());
   INFO(expected << "\n" << line);
   CHECK(line.find(expected) != std::string::npos);
+}
+
+const char* const kFisheyeCalibration =
+    "%YAML:1.0\n---\nimage_width: 50\nimage_height: 50\nfx: 15\nfy: 15\ncx: 25\ncy: 24\n"
+    "k1: 0.01\nk2: 0\nk3: 0\nk4: 0\n";
+
+std::unique_ptr<ImageSequence> open_hybrid(const fs::path& root, SequenceCameras cameras) {
+  return open_sequence(root.string(), SequenceLayout::kAuto, "M1", cameras);
+}
+
+TEST_CASE("the fisheye comes along when it is wanted") {
+  const TempFolder folder;
+  write_hybrid(folder.path());
+  const fs::path calibration = folder.path() / "hybrid/calibration/fisheye_calib.yaml";
+  write_text(calibration, kFisheyeCalibration);
+  for (const SequenceCameras cameras : {SequenceCameras::kHybrid, SequenceCameras::kAuto}) {
+    const auto sequence = open_hybrid(folder.path(), cameras);
+    CHECK(sequence->info().warnings.empty());
+    REQUIRE(sequence->info().fisheye);
+    CHECK(sequence->info().fisheye->params[3] == 24);
+    CHECK(holds(sequence->read(3).fisheye, test_picture(50, 50, 90)));
+    const auto& truth = sequence->info().fisheye_truth;
+    REQUIRE(truth.size() == sequence->info().truth.size());
+    CHECK(truth[3].time == Approx(4 / 3.0));
+    CHECK(truth[3].world_from_cam.translation().isApprox(fish_pose(4).translation(), 1e-8));
+  }
+  const auto stereo = open_hybrid(folder.path(), SequenceCameras::kStereo);
+  CHECK_FALSE(stereo->info().fisheye);
+  CHECK(stereo->read(3).fisheye.empty());
+}
+
+TEST_CASE("fisheye images may be missing for a while or altogether") {
+  const TempFolder folder;
+  write_hybrid(folder.path());
+  write_text(folder.path() / "hybrid/calibration/fisheye_calib.yaml", kFisheyeCalibration);
+  const fs::path images = folder.path() / "hybrid/M1/images/raw";
+  fs::remove(images / "2_fish.png");
+  truncate_file(images / "3_fish.png");
+  const auto sequence = open_hybrid(folder.path(), SequenceCameras::kHybrid);
+  REQUIRE(sequence->info().warnings.size() == 1);
+  CHECK(sequence->info().warnings[0].find("1 of 6 frames lack a fisheye image") !=
+        std::string::npos);
+  CHECK(sequence->read(2).fisheye.empty());
+  CHECK(sequence->read(2).fisheye_error.find("frame 2: no fisheye image") != std::string::npos);
+  CHECK(sequence->read(3).fisheye_error.find("3_fish.png") != std::string::npos);
+  CHECK(sequence->read(3).left.width == 60);
+  CHECK(sequence->read(4).fisheye_error.empty());
+  for (int i = 0; i < kFrames; ++i) fs::remove(images / (std::to_string(i) + "_fish.png"));
+  const auto none = open_hybrid(folder.path(), SequenceCameras::kHybrid);
+  CHECK_FALSE(none->info().fisheye);
+  REQUIRE(none->info().warnings.size() == 1);
+  CHECK(none->info().warnings[0].find("holds no fisheye images") != std::string::npos);
+  CHECK(open_hybrid(folder.path(), SequenceCameras::kAuto)->info().warnings.empty());
+}
+
+TEST_CASE("a fisheye calibration that cannot be used is refused, unless it is not needed") {
+  const TempFolder folder;
+  write_hybrid(folder.path());
+  const fs::path calibration = folder.path() / "hybrid/calibration/fisheye_calib.yaml";
+  const auto refused = [&](const std::string& from, const std::string& to,
+                           const std::string& reason) {
+    write_text(calibration, kFisheyeCalibration);
+    replace_text(calibration, from, to);
+    const std::string line =
+        complaint([&] { open_hybrid(folder.path(), SequenceCameras::kHybrid); });
+    INFO(line);
+    CHECK(line.find("fisheye_calib.yaml") != std::string::npos);
+    CHECK(line.find(reason) != std::string::npos);
+    CHECK_NOTHROW(open_hybrid(folder.path(), SequenceCameras::kStereo));
+  };
+  refused("fx: 15", "fx: .nan", "fx");
+  refused("k2: 0", "k2: -2", "folds at 32 degrees");
+  refused("image_width: 50", "image_width: 60", "the images are 50x50");
+  fs::remove(calibration);
+  CHECK(complaint([&] {
+          open_hybrid(folder.path(), SequenceCameras::kHybrid);
+        }).find("fisheye_calib.yaml") != std::string::npos);
 }
 
 }  // namespace

@@ -25,6 +25,10 @@ FilledMap map_of(const SyntheticScene& scene) {
   return fill_map(scene, fill);
 }
 
+std::vector<KeyframeId> newest(const FilledMap& filled, int count = 50) {
+  return newest_keyframes(filled.map.view(), count);
+}
+
 double center_distance(const Rigid3d& a, const Rigid3d& b) {
   return (origin_in_a(a) - origin_in_a(b)).norm();
 }
@@ -47,7 +51,7 @@ TEST_CASE("A frame from anywhere in the map is found in it") {
   const FilledMap filled = map_of(scene);
   for (const std::size_t index : {std::size_t{1}, std::size_t{11}, std::size_t{23}}) {
     const FrameView frame(scene, index);
-    const auto found = relocalize(filled.map.view(), frame.view(), {}, {}, {});
+    const auto found = relocalize(filled.map.view(), frame.view(), newest(filled), {}, {}, {});
     REQUIRE(found);
     CHECK(found->inliers >= 50);
     CHECK(center_distance(found->cam_from_world, frame.true_pose()) < 0.02);
@@ -70,7 +74,7 @@ TEST_CASE("A fisheye is found in a map of stereo keyframes") {
   const FilledMap filled = map_of(scene);  // every second frame: the stereo ones
   const FrameView frame(scene, 25);
   REQUIRE(baseline(frame.camera()) == 0);
-  const auto found = relocalize(filled.map.view(), frame.view(), {}, {}, {});
+  const auto found = relocalize(filled.map.view(), frame.view(), newest(filled), {}, {}, {});
   REQUIRE(found);
   CHECK(center_distance(found->cam_from_world, frame.true_pose()) < 0.03);
   CHECK(right_share(filled, frame, *found) > 0.98);
@@ -80,17 +84,16 @@ TEST_CASE("A frame of another place is not found") {
   const SyntheticScene scene = make_synthetic_scene(orbit());
   const SyntheticScene elsewhere = make_synthetic_scene(orbit(2));
   const FilledMap filled = map_of(scene);
-  CHECK(!relocalize(filled.map.view(), FrameView(elsewhere, 5).view(), {}, {}, {}));
+  CHECK(!relocalize(filled.map.view(), FrameView(elsewhere, 5).view(), newest(filled), {}, {}, {}));
 }
 
 TEST_CASE("Only so many keyframes are tried, newest first") {
   const SyntheticScene scene = make_synthetic_scene(orbit());
   const FilledMap filled = map_of(scene);
   const FrameView far_from_newest(scene, 13);  // across the circle
-  RelocalizationOptions options;
-  options.max_keyframes = 1;
-  CHECK(!relocalize(filled.map.view(), far_from_newest.view(), {}, {}, options));
-  const auto found = relocalize(filled.map.view(), FrameView(scene, 29).view(), {}, {}, options);
+  CHECK(!relocalize(filled.map.view(), far_from_newest.view(), newest(filled, 1), {}, {}, {}));
+  const auto found =
+      relocalize(filled.map.view(), FrameView(scene, 29).view(), newest(filled, 1), {}, {}, {});
   REQUIRE(found);
   CHECK(found->keyframe == filled.keyframes.back());
 }
@@ -104,7 +107,7 @@ TEST_CASE("Descriptors of another kind match nothing") {
        match_keyframe(filled.map.view(), filled.keyframes[5], frame.features(), 0.75, 0.7)) {
     CHECK(!id.valid());
   }
-  CHECK(!relocalize(filled.map.view(), frame.view(), {}, {}, {}));
+  CHECK(!relocalize(filled.map.view(), frame.view(), newest(filled), {}, {}, {}));
 }
 
 TEST_CASE("RelocalizationOptions out of range are refused") {

@@ -36,7 +36,7 @@ Frame wall_frame(std::int64_t index, const Eigen::Vector2d& shift, const BlobTex
   }
   Frame frame = make_frame(index, 0.1 * static_cast<double>(index), features, kWidth, kHeight);
   const Eigen::Vector2d offset = -shift;
-  frame.left = std::make_shared<const ImagePyramid>(
+  frame.image = std::make_shared<const ImagePyramid>(
       texture.render(kWidth, kHeight, Eigen::Matrix2d::Identity(), offset, 1, 0, 1, random));
   frame.cam_from_world = Rigid3d(Eigen::Quaterniond::Identity(),
                                  {shift.x() * kDepth / kFocal, shift.y() * kDepth / kFocal, 0});

@@ -1,0 +1,116 @@
+#include "frontend/tracking/fisheye_tracker.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "frontend/tracking/stereo_keyframe.h"
+
+namespace hybrid_slam {
+namespace {
+
+// Median distance of the landmarks that a frame shows [m]; infinite if there are none.
+double median_distance(const MapSnapshot& map, const Frame& frame) {
+  std::vector<double> distances;
+  for (const LandmarkId id : frame.landmarks) {
+    const Landmark* landmark = id.valid() ? map.find(id) : nullptr;
+    if (landmark != nullptr) {
+      distances.push_back((frame.cam_from_world * landmark->point_in_world).norm());
+    }
+  }
+  if (distances.empty()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const auto middle = distances.begin() + static_cast<long>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+}  // namespace
+
+FisheyeTrackerOptions::FisheyeTrackerOptions() {
+  keyframes.min_tracked_ratio = 0.5;
+  relocalization.min_inliers = 30;
+}
+
+std::string FisheyeTrackerOptions::validate() const {
+  const std::string error = TrackerOptions::validate();
+  return error.empty() ? error : "fisheye: " + error;
+}
+
+FisheyeTracker::FisheyeTracker(CameraId camera_id, const Calibrated<KannalaBrandt>& camera,
+                               const FisheyeTrackerOptions& options)
+    : camera_id_(camera_id),
+      options_(options),
+      matcher_(camera_id, camera, options),
+      last_(camera_id) {
+  const std::string error = options.validate();
+  if (!error.empty()) {
+    throw std::invalid_argument(error);
+  }
+}
+
+TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, KeyframeId stereo_reference,
+                                   bool allow_keyframe) {
+  last_.follow(map);
+  TrackedFrame result;
+  result.frame_index = frame.index;
+  result.time = frame.time;
+  if (matcher_.relocalize(map, candidates(map, stereo_reference), frame)) {
+    auto match = matcher_.match_local_map(map, valid_ids(frame.landmarks),
+                                          options_.min_local_map_inliers, frame);
+    if (match) {
+      result.source = last_.tracked() ? PoseSource::kLocalMap : PoseSource::kRelocalization;
+      result.cam_from_world = frame.cam_from_world;
+      result.reference = match->reference;
+      result.cam_from_reference =
+          frame.cam_from_world * inverse(map.cam_from_world(match->reference));
+      result.inliers = match->inliers;
+      result.counts = std::move(match->counts);
+    }
+  }
+  if (result.tracked() && allow_keyframe && !last_.waits_for_keyframe() &&
+      wants_keyframe(frame, map, result)) {
+    result.keyframe = NewKeyframe{make_observations(camera_id_, frame),
+                                  frame.cam_from_world,
+                                  frame.landmarks,
+                                  {},
+                                  result.reference};
+    matcher_.remember_keyframe(frame);
+  }
+  last_.remember(std::move(frame), result);
+  return result;
+}
+
+std::vector<KeyframeId> FisheyeTracker::candidates(const MapSnapshot& map,
+                                                   KeyframeId stereo_reference) const {
+  std::vector<KeyframeId> keyframes;
+  const auto add = [&](KeyframeId id) {
+    if (map.find(id) != nullptr &&
+        std::find(keyframes.begin(), keyframes.end(), id) == keyframes.end()) {
+      keyframes.push_back(id);
+    }
+  };
+  if (last_.tracked()) {
+    add(last_.reference());
+  }
+  add(stereo_reference);
+  for (const KeyframeId id : newest_keyframes(map, options_.relocalization.max_keyframes)) {
+    add(id);
+  }
+  return keyframes;
+}
+
+bool FisheyeTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
+                                    const TrackedFrame& result) const {
+  KeyframeEvidence evidence;
+  evidence.inliers = result.inliers;
+  evidence.reference_landmarks = count_well_founded(map, result.reference);
+  evidence.close_tracked = options_.max_features;  // a single camera makes no close points
+  evidence.frames_since_keyframe = static_cast<int>(frame.index - last_.keyframe_frame());
+  evidence.keyframes = map.keyframe_count();
+  evidence.motion = result.cam_from_reference.translation().norm() / median_distance(map, frame);
+  return needs_keyframe(evidence, options_.max_features, options_.keyframes);
+}
+
+}  // namespace hybrid_slam

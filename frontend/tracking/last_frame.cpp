@@ -1,0 +1,44 @@
+#include "frontend/tracking/last_frame.h"
+
+#include <utility>
+
+namespace hybrid_slam {
+
+void LastFrame::follow(const MapSnapshot& map) {
+  if (!tracked_ || !frame_) {
+    return;
+  }
+  if (requested_) {
+    const Keyframe* keyframe = map.find_frame(camera_, *requested_);
+    if (keyframe != nullptr && frame_->index == *requested_) {
+      reference_ = keyframe->id;
+      frame_->landmarks = keyframe->landmarks;
+      cam_from_reference_ = Rigid3d();
+    }
+    if (map.newest_frame_index(camera_) >= *requested_) {
+      requested_.reset();
+    }
+  }
+  if (reference_.valid()) {
+    frame_->cam_from_world = cam_from_reference_ * map.cam_from_world(reference_);
+  }
+}
+
+void LastFrame::remember(Frame frame, const TrackedFrame& result) {
+  velocity_.reset();
+  if (result.tracked() && tracked_ && frame_) {
+    velocity_ = frame.cam_from_world * inverse(frame_->cam_from_world);
+  }
+  if (result.keyframe) {
+    requested_ = frame.index;
+    keyframe_frame_ = frame.index;
+  }
+  if (result.tracked()) {
+    reference_ = result.reference;
+    cam_from_reference_ = result.cam_from_reference;
+  }
+  tracked_ = result.tracked();
+  frame_ = std::move(frame);
+}
+
+}  // namespace hybrid_slam

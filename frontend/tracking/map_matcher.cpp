@@ -1,0 +1,130 @@
+#include "frontend/tracking/map_matcher.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace hybrid_slam {
+namespace {
+
+void assign(const std::vector<ProjectionMatch>& matches, Frame& frame) {
+  for (const ProjectionMatch& match : matches) {
+    frame.landmarks[static_cast<std::size_t>(match.keypoint)] = match.landmark;
+  }
+}
+
+// Those that the frame does not have yet.
+std::vector<LandmarkPrediction> without(const std::vector<LandmarkPrediction>& predictions,
+                                        const Frame& frame) {
+  std::vector<LandmarkId> matched = valid_ids(frame.landmarks);
+  std::sort(matched.begin(), matched.end());
+  std::vector<LandmarkPrediction> open;
+  std::copy_if(predictions.begin(), predictions.end(), std::back_inserter(open),
+               [&](const LandmarkPrediction& prediction) {
+                 return !std::binary_search(matched.begin(), matched.end(), prediction.id);
+               });
+  return open;
+}
+
+}  // namespace
+
+std::string TrackerOptions::validate() const {
+  if (max_features < 1) {
+    return "tracking: max_features must be positive";
+  }
+  if (!(local_map_radius > 0)) return "tracking: local_map_radius must be positive";
+  if (min_local_map_inliers < 6) return "tracking: min_local_map_inliers must be at least 6";
+  for (const std::string& error :
+       {matcher.validate(), local_map.validate(), relocalization.validate(), keyframes.validate(),
+        refinement.validate()}) {
+    if (!error.empty()) {
+      return error;
+    }
+  }
+  return {};
+}
+
+std::vector<LandmarkId> valid_ids(const std::vector<LandmarkId>& ids) {
+  std::vector<LandmarkId> valid;
+  std::copy_if(ids.begin(), ids.end(), std::back_inserter(valid),
+               [](LandmarkId id) { return id.valid(); });
+  return valid;
+}
+
+FeatureView MapMatcher::view_of(const Frame& frame) const {
+  return {camera_, frame.features.left, frame.features.u_right, frame.grid};
+}
+
+int MapMatcher::refine(const MapSnapshot& map, Frame& frame) const {
+  std::vector<std::size_t> keypoint;
+  const auto observations = pose_observations(map, frame.features.left, frame.features.u_right,
+                                              frame.landmarks, keypoint);
+  const auto refined = refine_pose(camera_, frame.cam_from_world, observations, options_.pose);
+  std::vector<LandmarkId> kept(frame.size());
+  for (std::size_t i = 0; i < keypoint.size(); ++i) {
+    if (refined.inlier[i]) {
+      kept[keypoint[i]] = frame.landmarks[keypoint[i]];
+    }
+  }
+  frame.landmarks = std::move(kept);
+  frame.cam_from_world = refined.cam_from_world;
+  return refined.inliers;
+}
+
+int MapMatcher::match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids,
+                                  double radius, Frame& frame) const {
+  ProjectionMatcherOptions matcher = options_.matcher;
+  matcher.radius = radius;
+  const auto predictions =
+      predict_landmarks(map, camera_, frame.cam_from_world, ids, matcher.max_view_angle_deg);
+  const auto matches = match_predictions(map, view_of(frame), predictions, nullptr, matcher);
+  frame.landmarks.assign(frame.size(), LandmarkId());
+  assign(matches, frame);
+  return static_cast<int>(matches.size());
+}
+
+std::optional<MapMatcher::LocalMapMatch> MapMatcher::match_local_map(
+    const MapSnapshot& map, const std::vector<LandmarkId>& seeds, int min_inliers,
+    Frame& frame) const {
+  const LocalMap local = make_local_map(map, seeds, options_.local_map);
+  if (!local.reference.valid()) {
+    return std::nullopt;
+  }
+  LocalMapMatch match;
+  match.reference = local.reference;
+  const auto predictions = predict_landmarks(map, camera_, frame.cam_from_world, local.landmarks,
+                                             options_.matcher.max_view_angle_deg);
+  for (const LandmarkPrediction& prediction : predictions) {
+    match.counts.visible.push_back(prediction.id);
+  }
+  std::vector<char> taken(frame.size(), 0);
+  std::transform(frame.landmarks.begin(), frame.landmarks.end(), taken.begin(),
+                 [](LandmarkId id) { return static_cast<char>(id.valid()); });
+  ProjectionMatcherOptions matcher = options_.matcher;
+  matcher.radius = options_.local_map_radius;
+  assign(match_predictions(map, view_of(frame), without(predictions, frame), &taken, matcher),
+         frame);
+  refine(map, frame);
+  if (refiner_.refine(map, frame) > 0) {
+    refine(map, frame);
+  }
+  match.counts.found = valid_ids(frame.landmarks);
+  match.inliers = static_cast<int>(match.counts.found.size());
+  if (match.inliers < min_inliers) {
+    return std::nullopt;
+  }
+  return match;
+}
+
+bool MapMatcher::relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
+                            Frame& frame) const {
+  auto found = hybrid_slam::relocalize(map, view_of(frame), keyframes, options_.matcher,
+                                       options_.pose, options_.relocalization);
+  if (!found) {
+    return false;
+  }
+  frame.cam_from_world = found->cam_from_world;
+  frame.landmarks = std::move(found->landmarks);
+  return true;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "backend/map/map_edit.h"
+#include "backend/map/map_snapshot.h"
+#include "frontend/matching/projection_matcher.h"
+#include "frontend/pose/pose_refinement.h"
+#include "frontend/tracking/frame.h"
+#include "frontend/tracking/keyframe_policy.h"
+#include "frontend/tracking/local_map.h"
+#include "frontend/tracking/relocalization.h"
+#include "frontend/tracking/track_refinement.h"
+
+namespace hybrid_slam {
+
+// What the trackers of both cameras have in common.
+struct TrackerOptions {
+  int max_features = 2000;      // N: the measure of shares
+  double local_map_radius = 3;  // [px]
+  int min_local_map_inliers = 30;
+  ProjectionMatcherOptions matcher;
+  PoseRefinementOptions pose;
+  LocalMapOptions local_map;
+  KeyframePolicyOptions keyframes;
+  RelocalizationOptions relocalization;
+  TrackRefinementOptions refinement;
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
+};
+
+std::vector<LandmarkId> valid_ids(const std::vector<LandmarkId>& ids);
+
+// The steps by which a frame of either camera is fitted to the map. Each starts from the frame's
+// pose and landmarks and leaves better ones there.
+class MapMatcher {
+ public:
+  MapMatcher(CameraId camera_id, const Camera& camera, const TrackerOptions& options)
+      : camera_(camera), options_(options), refiner_(camera_id, camera, options.refinement) {}
+
+  FeatureView view_of(const Frame& frame) const;
+
+  // Optimises the pose on the landmarks that the frame has and drops those that disagree. Returns
+  // how many are left.
+  int refine(const MapSnapshot& map, Frame& frame) const;
+
+  // Looks for landmarks in windows of `radius` [px] around their projections, instead of those that
+  // the frame has. Returns how many were found; nothing is optimised.
+  int match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids, double radius,
+                        Frame& frame) const;
+
+  struct LocalMapMatch {
+    KeyframeId reference;  // shares most landmarks with the frame, of either camera
+    int inliers = 0;
+    MapEdit counts;  // found and visible landmarks
+  };
+
+  // Adds the landmarks of keyframes around `seeds`, at the local map's radius, aligns patches and
+  // optimises. None with fewer than `min_inliers`, or where nothing is around.
+  std::optional<LocalMapMatch> match_local_map(const MapSnapshot& map,
+                                               const std::vector<LandmarkId>& seeds,
+                                               int min_inliers, Frame& frame) const;
+
+  // Finds the frame without a prediction, in the first of `keyframes` that shows it.
+  bool relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
+                  Frame& frame) const;
+
+  // The frame becomes a keyframe: its image can serve as a reference.
+  void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }
+
+ private:
+  Camera camera_;
+  TrackerOptions options_;
+  TrackRefiner refiner_;
+};
+
+}  // namespace hybrid_slam
