@@ -13,6 +13,7 @@ namespace {
 constexpr const char* kFooter = R"(Writes to DIR:
   stereo.tum         every tracked frame, final estimate (world_from_cam of the left camera)
   stereo_online.tum  the estimate at the moment each frame was tracked
+  fisheye.tum, fisheye_online.tum   the same of the fisheye
   map.hslam          the whole map, to go on with (docs/map_file.md)
   map.ply, map.png   landmarks and keyframes; map and path from above and from the side
   timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
@@ -44,17 +45,25 @@ bool is_count(const std::string& text) {
 std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code) {
   CommandLine line;
   std::string config;
-  std::string cameras = "stereo";
   std::optional<int> features;
   std::optional<std::uint64_t> seed;
   const std::map<std::string, SequenceLayout> layouts{{"auto", SequenceLayout::kAuto},
                                                       {"kitti", SequenceLayout::kKitti},
                                                       {"euroc", SequenceLayout::kEuroc},
                                                       {"uwslam", SequenceLayout::kUwslam}};
+  const std::map<std::string, SequenceCameras> cameras{{"auto", SequenceCameras::kAuto},
+                                                       {"stereo", SequenceCameras::kStereo},
+                                                       {"hybrid", SequenceCameras::kHybrid}};
+  const std::map<std::string, TruthConvention> conventions{
+      {"auto", TruthConvention::kAuto},
+      {"world_from_cam", TruthConvention::kWorldFromCam},
+      {"cam_from_world", TruthConvention::kCamFromWorld}};
   const std::map<std::string, RunMode> modes{{"every-frame", RunMode::kEveryFrame},
                                              {"realtime", RunMode::kRealtime}};
 
-  CLI::App app("Visual SLAM on a stereo image sequence.", "hybrid_slam");
+  CLI::App app(
+      "Visual SLAM on a sequence of stereo images, and those of a fisheye that moves by itself.",
+      "hybrid_slam");
   app.footer(kFooter);
   app.add_option("DATASET", line.dataset, "folder of the dataset")->required();
   app.add_option("--layout", line.layout, "auto, kitti, euroc or uwslam")
@@ -74,9 +83,15 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--rate", line.rate,
                  "realtime: images per second; those that come too early are dropped and counted")
       ->check(must_be(is_rate, "is no rate between 0.001 and 100000 Hz"));
-  app.add_option("--cameras", cameras, "stereo (hybrid: not in this version)")
-      ->check(CLI::IsMember({"stereo", "hybrid"}).description(""))
+  app.add_option("--cameras", line.cameras,
+                 "stereo, hybrid (with the fisheye) or auto (default: with the fisheye, if the "
+                 "dataset has one)")
+      ->transform(CLI::CheckedTransformer(cameras).description(""))
       ->option_text("WHICH");
+  app.add_option("--gt-convention", line.truth_convention,
+                 "how the true poses of a UWslam sequence are meant; auto (default) finds out")
+      ->transform(CLI::CheckedTransformer(conventions).description(""))
+      ->option_text("auto|world_from_cam|cam_from_world");
   app.add_option("--features", features, "features per image (default 2000)")
       ->check(CLI::Range(50, 100000).description(""));
   app.add_option("--seed", seed, "of every random choice (default 0)")
@@ -93,9 +108,6 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
     app.parse(argc, argv);
     if (line.rate > 0 && line.mode != RunMode::kRealtime) {
       throw CLI::ValidationError("--rate needs --mode realtime");
-    }
-    if (cameras == "hybrid") {
-      throw CLI::ValidationError("--cameras hybrid is not in this version");
     }
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // --help

@@ -16,6 +16,8 @@ struct CommandLine {
   std::string dataset;
   SequenceLayout layout = SequenceLayout::kAuto;
   std::string sequence;
+  SequenceCameras cameras = SequenceCameras::kAuto;
+  TruthConvention truth_convention = TruthConvention::kAuto;
   std::string out = "out";
   RunMode mode = RunMode::kEveryFrame;
   double rate = 0;  // [Hz]; 0: images wait for the pipeline

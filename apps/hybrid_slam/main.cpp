@@ -44,15 +44,16 @@ std::string checkpoint(const CommandLine& line, const MapSnapshot& map) {
 }
 
 int run(const CommandLine& line) {
-  const auto sequence = open_sequence(line.dataset, line.layout, line.sequence);
+  const auto sequence =
+      open_sequence(line.dataset, line.layout, line.sequence, line.cameras, line.truth_convention);
   make_output_folder(line.out);
   for (const std::string& warning : sequence->info().warnings) {
     spdlog::warn(warning);
   }
   if (!line.quiet) {
-    spdlog::info("{} ({}): {} stereo frames of {}x{}", sequence->info().name,
-                 sequence->info().layout, sequence->size(), sequence->info().stereo.width,
-                 sequence->info().stereo.height);
+    const SequenceInfo& info = sequence->info();
+    spdlog::info("{} ({}): {} stereo frames of {}x{}{}", info.name, info.layout, sequence->size(),
+                 info.stereo.width, info.stereo.height, info.fisheye ? ", with a fisheye" : "");
   }
   ProgressPrinter progress(line.quiet);
   RunHooks hooks;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "apps/hybrid_slam/version.h"
 #include "apps/io/map_picture.h"
@@ -22,9 +23,9 @@ struct Trajectories {
   Trajectory online;
 };
 
-Trajectories collect(const RunResult& result) {
+Trajectories collect(const RunResult& result, const std::vector<FrameRecord>& records) {
   Trajectories trajectories;
-  for (const FrameRecord& record : result.records) {
+  for (const FrameRecord& record : records) {
     if (record.frame.tracked()) {
       trajectories.final_estimate.push_back(
           {record.frame.time, inverse(result.cam_from_world(record))});
@@ -34,51 +35,84 @@ Trajectories collect(const RunResult& result) {
   return trajectories;
 }
 
+// A quarter of the shortest time between two frames [s].
+double max_difference(const SequenceInfo& sequence) {
+  double shortest = 1;
+  for (std::size_t i = 1; i < sequence.times.size(); ++i) {
+    shortest = std::min(shortest, sequence.times[i] - sequence.times[i - 1]);
+  }
+  return shortest / 4;
+}
+
 std::optional<AbsoluteError> evaluate(const SequenceInfo& sequence, const Trajectory& estimate) {
   if (sequence.truth.empty() || estimate.empty()) {
     return std::nullopt;
   }
-  double shortest = 1;  // [s] between two frames
-  for (std::size_t i = 1; i < sequence.times.size(); ++i) {
-    shortest = std::min(shortest, sequence.times[i] - sequence.times[i - 1]);
-  }
-  return absolute_error(associate(estimate, sequence.truth, shortest / 4),
+  return absolute_error(associate(estimate, sequence.truth, max_difference(sequence)),
                         TrajectoryAlignment::kSe3);
 }
 
+// Against the true poses of the frames that were read.
+std::optional<HybridError> evaluate_hybrid(const SequenceInfo& sequence, const RunResult& result,
+                                           const Trajectory& stereo, const Trajectory& fisheye) {
+  if (!sequence.fisheye || !sequence.truth_has_rotation || result.records.empty()) {
+    return std::nullopt;
+  }
+  const double difference = max_difference(sequence);
+  std::vector<StampedPose> true_fisheye;
+  for (const StampedPose& pose : sequence.fisheye_truth) {
+    if (pose.time <= result.records.back().frame.time + difference) true_fisheye.push_back(pose);
+  }
+  return hybrid_error(stereo, fisheye, sequence.truth, true_fisheye, difference);
+}
+
+std::vector<Eigen::Vector3d> positions(const Trajectory& trajectory,
+                                       const Sim3d& picture_from_world = Sim3d()) {
+  std::vector<Eigen::Vector3d> points;
+  for (const StampedPose& pose : trajectory) {
+    points.push_back(picture_from_world * Eigen::Vector3d(pose.world_from_cam.translation()));
+  }
+  return points;
+}
+
 MapPicture make_picture(const SequenceInfo& sequence, const RunResult& result,
-                        const Trajectory& estimate, const std::optional<AbsoluteError>& ate) {
+                        const Trajectory& stereo, const Trajectory& fisheye,
+                        const std::optional<AbsoluteError>& ate) {
   MapPicture picture;
   picture.title = fmt::format("{}: {} keyframes, {} landmarks", sequence.name,
                               result.map->keyframe_count(), result.map->landmark_count());
-  picture.points = landmark_positions(*result.map);
-  for (const StampedPose& pose : estimate) {
-    picture.path.emplace_back(pose.world_from_cam.translation());
-  }
+  MapPositions of_stereo = stereo_positions(*result.map);
+  MapPositions of_fisheye = fisheye_positions(*result.map);
+  picture.points = std::move(of_stereo.landmarks);
+  picture.keyframes = std::move(of_stereo.keyframes);
+  picture.path = positions(stereo);
+  picture.fisheye_points = std::move(of_fisheye.landmarks);
+  picture.fisheye_keyframes = std::move(of_fisheye.keyframes);
+  picture.fisheye_path = positions(fisheye);
   if (ate) {
     const Sim3d estimate_from_truth = inverse(ate->truth_from_estimate);
-    for (const StampedPose& pose : sequence.truth) {
-      picture.truth.push_back(estimate_from_truth *
-                              Eigen::Vector3d(pose.world_from_cam.translation()));
+    picture.truth = positions(sequence.truth, estimate_from_truth);
+    if (sequence.fisheye) {
+      picture.fisheye_truth = positions(sequence.fisheye_truth, estimate_from_truth);
     }
   }
   return picture;
 }
 
 template <typename Key>
-Json count_by(const RunResult& result, Key key) {
+Json count_by(const std::vector<FrameRecord>& records, Key key) {
   Json counts = Json::object();
-  for (const FrameRecord& record : result.records) {
+  for (const FrameRecord& record : records) {
     const std::string name = key(record.frame);
     counts[name] = counts.value(name, 0) + 1;
   }
   return counts;
 }
 
-Json options_json(const CommandLine& line) {
+Json options_json(const CommandLine& line, bool hybrid) {
   const SlamOptions& options = line.options;
   return {{"mode", line.mode == RunMode::kRealtime ? "realtime" : "every-frame"},
-          {"cameras", "stereo"},
+          {"cameras", hybrid ? "hybrid" : "stereo"},
           {"features", options.features},
           {"threads", line.threads},
           {"rate", line.rate},
@@ -87,6 +121,23 @@ Json options_json(const CommandLine& line) {
           {"upsample", options.sift.upsample},
           {"refine_stereo", options.stereo.refine},
           {"refine_tracks", options.tracking.refinement.enabled}};
+}
+
+// What a fisheye adds to the summary.
+Json fisheye_json(const RunResult& result, const RunSummary& summary) {
+  const FrameCounts& frames = result.fisheye_frames;
+  const MapPositions found = fisheye_positions(*result.map);
+  Json json;
+  json["frames"] = {{"read", frames.read},
+                    {"registered", frames.tracked},
+                    {"lost", frames.lost},
+                    {"missing", frames.corrupt}};
+  json["poses_from"] = count_by(result.fisheye_records,
+                                [](const TrackedFrame& frame) { return to_string(frame.source); });
+  json["keyframes"] = found.keyframes.size();
+  json["landmarks"] = found.landmarks.size();
+  json["relative_pose_error"] = summary.hybrid ? to_json(*summary.hybrid) : Json();
+  return json;
 }
 
 Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const RunResult& result,
@@ -101,11 +152,12 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
                     {"dropped", frames.dropped},
                     {"corrupt", frames.corrupt}};
   json["poses_from"] =
-      count_by(result, [](const TrackedFrame& frame) { return to_string(frame.source); });
-  json["predictions_from"] =
-      count_by(result, [](const TrackedFrame& frame) { return to_string(frame.prediction); });
+      count_by(result.records, [](const TrackedFrame& frame) { return to_string(frame.source); });
+  json["predictions_from"] = count_by(
+      result.records, [](const TrackedFrame& frame) { return to_string(frame.prediction); });
   json["keyframes"] = result.map->keyframe_count();
   json["landmarks"] = result.map->landmark_count();
+  if (sequence.fisheye) json["fisheye"] = fisheye_json(result, summary);
   json["disparity_offset_px"] =
       result.records.empty() ? 0 : result.records.back().frame.disparity_offset;
   json["interrupted"] = result.cancelled;
@@ -114,7 +166,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   json["ate"] = summary.ate ? to_json(*summary.ate) : Json();
   json["truth_convention"] =
       sequence.truth_convention.empty() ? Json() : Json(sequence.truth_convention);
-  json["options"] = options_json(line);
+  json["options"] = options_json(line, sequence.fisheye.has_value());
   json["seed"] = line.options.seed;
   json["blas"] = blas_name();
   json["git_commit"] = kGitCommit;
@@ -132,15 +184,21 @@ void write_map(const CommandLine& line, const MapSnapshot& map) {
 RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
                          const RunResult& result, double seconds) {
   const std::filesystem::path out = line.out;
-  const Trajectories trajectories = collect(result);
+  const Trajectories stereo = collect(result, result.records);
+  const Trajectories fisheye = collect(result, result.fisheye_records);
   RunSummary summary;
   summary.seconds = seconds;
-  summary.ate = evaluate(sequence, trajectories.final_estimate);
-  write_tum(out / "stereo.tum", trajectories.final_estimate);
-  write_tum(out / "stereo_online.tum", trajectories.online);
+  summary.ate = evaluate(sequence, stereo.final_estimate);
+  summary.hybrid = evaluate_hybrid(sequence, result, stereo.final_estimate, fisheye.final_estimate);
+  write_tum(out / "stereo.tum", stereo.final_estimate);
+  write_tum(out / "stereo_online.tum", stereo.online);
+  if (sequence.fisheye) {
+    write_tum(out / "fisheye.tum", fisheye.final_estimate);
+    write_tum(out / "fisheye_online.tum", fisheye.online);
+  }
   write_map_ply(out / "map.ply", *result.map);
-  write_map_picture(out / "map.png",
-                    make_picture(sequence, result, trajectories.final_estimate, summary.ate));
+  write_map_picture(out / "map.png", make_picture(sequence, result, stereo.final_estimate,
+                                                  fisheye.final_estimate, summary.ate));
   write_json(out / "timing.json", to_json(result.times));
   write_json(out / "summary.json", summary_json(line, sequence, result, summary));
   write_map(line, *result.map);  // the largest: where the disk gets full, the others are there
@@ -151,6 +209,11 @@ void print_summary(const CommandLine& line, const RunResult& result, const RunSu
   const FrameCounts& frames = result.frames;
   fmt::print("frames     {} read, {} tracked, {} lost, {} dropped, {} corrupt\n", frames.read,
              frames.tracked, frames.lost, frames.dropped, frames.corrupt);
+  if (summary.hybrid || result.fisheye_frames.read > 0) {
+    const FrameCounts& fisheye = result.fisheye_frames;
+    fmt::print("fisheye    {} read, {} registered, {} lost, {} missing\n", fisheye.read,
+               fisheye.tracked, fisheye.lost, fisheye.corrupt);
+  }
   fmt::print("map        {} keyframes, {} landmarks\n", result.map->keyframe_count(),
              result.map->landmark_count());
   fmt::print("time       {:.1f} s, {:.2f} frames per second\n", summary.seconds,
@@ -161,6 +224,16 @@ void print_summary(const CommandLine& line, const RunResult& result, const RunSu
     if (const auto ratio = summary.ate->length_ratio()) {
       fmt::print("length     {:.4f} of the true {:.2f} m\n", *ratio, summary.ate->true_length);
     }
+  }
+  if (summary.hybrid) {
+    constexpr double kDegrees = 180 / std::numbers::pi;
+    const HybridError& hybrid = *summary.hybrid;
+    fmt::print(
+        "arm        {:.4f} cm, {:.4f} deg mean; {:.4f} cm, {:.4f} deg median (fisheye from "
+        "left, {} of {} frames)\n",
+        100 * hybrid.translation.mean, kDegrees * hybrid.rotation.mean,
+        100 * hybrid.translation.median, kDegrees * hybrid.rotation.median, hybrid.registered,
+        hybrid.total);
   }
   fmt::print("written to {}\n", line.out);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "apps/hybrid_slam/command_line.h"
+#include "apps/io/hybrid_error.h"
 #include "apps/io/trajectory.h"
 #include "apps/pipeline/slam_run.h"
 
@@ -8,8 +9,9 @@ namespace hybrid_slam {
 
 // What is told of a run, in summary.json and on the screen.
 struct RunSummary {
-  double seconds = 0;                // from the first image to the last
-  std::optional<AbsoluteError> ate;  // where the dataset has truth; SE3 alignment
+  double seconds = 0;                 // from the first image to the last
+  std::optional<AbsoluteError> ate;   // where the dataset has truth; SE3 alignment
+  std::optional<HybridError> hybrid;  // where it has the truth of both cameras
 };
 
 // Writes the map into line.out. Throws OutputError.

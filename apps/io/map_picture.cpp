@@ -31,9 +31,11 @@ constexpr double kBorder = 0.06;         // around what is shown, of its size
 
 const cv::Scalar kInk(40, 40, 40);
 const cv::Scalar kGrid(232, 232, 232);
-const cv::Scalar kPathColor(30, 90, 235);    // orange red (BGR)
-const cv::Scalar kTruthColor(70, 150, 40);   // green
-const cv::Scalar kPointColor(165, 120, 70);  // steel blue
+const cv::Scalar kPathColor(30, 90, 235);           // orange red (BGR)
+const cv::Scalar kTruthColor(70, 150, 40);          // green
+const cv::Scalar kPointColor(165, 120, 70);         // steel blue
+const cv::Scalar kFisheyePointColor(150, 60, 170);  // purple
+const cv::Scalar kFisheyePathColor(120, 20, 140);   // dark purple
 
 // The two axes of a panel: which coordinate goes right and which up, and with which sign.
 struct View {
@@ -70,7 +72,8 @@ std::array<View, 2> choose_views(const Points& path) {
           View{"from the side (x right, z forward)", 0, 2, 1}};
 }
 
-Range robust_range(const Points& points, const Points& path, const Points& truth, int axis) {
+// Of most points, and all that lies on a path.
+Range robust_range(const Points& points, const Points& paths, int axis) {
   std::vector<double> values;
   for (const Eigen::Vector3d& p : points) values.push_back(p[axis]);
   std::sort(values.begin(), values.end());
@@ -78,14 +81,12 @@ Range robust_range(const Points& points, const Points& path, const Points& truth
   if (!values.empty()) {
     const auto skip = static_cast<std::size_t>(kLowPercentile * static_cast<double>(values.size()));
     range = {values[skip], values[values.size() - 1 - skip]};
-  } else if (!path.empty()) {
-    range = {path.front()[axis], path.front()[axis]};
+  } else if (!paths.empty()) {
+    range = {paths.front()[axis], paths.front()[axis]};
   }
-  for (const Points* const line : {&path, &truth}) {
-    for (const Eigen::Vector3d& p : *line) {
-      range.low = std::min(range.low, p[axis]);
-      range.high = std::max(range.high, p[axis]);
-    }
+  for (const Eigen::Vector3d& p : paths) {
+    range.low = std::min(range.low, p[axis]);
+    range.high = std::max(range.high, p[axis]);
   }
   return range;
 }
@@ -141,7 +142,7 @@ class Panel {
   }
 
   // Each point darkens its place a little, so that dense structures stand out.
-  void draw_points(const Points& points) {
+  void draw_points(const Points& points, const cv::Scalar& color) {
     cv::Mat count(area_.size(), CV_32FC1, cv::Scalar(0));
     for (const Eigen::Vector3d& point : points) {
       const cv::Point2d at = pixel(point);
@@ -156,8 +157,7 @@ class Panel {
         const double opacity = 1 - std::pow(0.55, n);
         auto& target = image_.at<cv::Vec3b>(area_.y + y, area_.x + x);
         for (int c = 0; c < 3; ++c) {
-          target[c] =
-              cv::saturate_cast<uchar>((1 - opacity) * target[c] + opacity * kPointColor[c]);
+          target[c] = cv::saturate_cast<uchar>((1 - opacity) * target[c] + opacity * color[c]);
         }
       }
     }
@@ -180,6 +180,13 @@ class Panel {
     cv::circle(image_, first, 6, cv::Scalar(255, 255, 255), cv::FILLED, cv::LINE_AA);
     cv::circle(image_, first, 6, kPathColor, 2, cv::LINE_AA);
     cv::rectangle(image_, last - cv::Point(5, 5), last + cv::Point(5, 5), kPathColor, cv::FILLED);
+  }
+
+  void draw_keyframes(const Points& keyframes, const cv::Scalar& color) {
+    for (const Eigen::Vector3d& keyframe : keyframes) {
+      const cv::Point at = pixel(keyframe);
+      cv::rectangle(image_, at - cv::Point(3, 3), at + cv::Point(3, 3), color, 1, cv::LINE_AA);
+    }
   }
 
   void draw_scale_bar() {
@@ -243,7 +250,9 @@ class Panel {
 
 void draw_legend(cv::Mat& image, const MapPicture& picture) {
   write_text(image, picture.title, {kLeft + 4, 34}, 0.8);
-  int x = kLeft + kPanelWidth + kMargin + kLeft;
+  const bool hybrid = !picture.fisheye_path.empty();
+  int x =
+      hybrid ? kLeft + text_width(picture.title, 0.8) + 40 : kLeft + kPanelWidth + kMargin + kLeft;
   const auto entry = [&](const std::string& text, const cv::Scalar& color, bool line) {
     if (line) {
       cv::line(image, {x, 28}, {x + 30, 28}, color, 3, cv::LINE_AA);
@@ -253,30 +262,66 @@ void draw_legend(cv::Mat& image, const MapPicture& picture) {
     write_text(image, text, {x + 38, 34}, 0.6);
     x += 38 + text_width(text, 0.6) + 24;
   };
-  entry(fmt::format("{} landmarks", picture.points.size()), kPointColor, false);
-  entry("path (o start, # end)", kPathColor, true);
+  const char* const of_stereo = hybrid ? "stereo " : "";
+  entry(fmt::format("{} {}landmarks", picture.points.size(), of_stereo), kPointColor, false);
+  entry(fmt::format("{}path (o start, # end)", of_stereo), kPathColor, true);
+  if (hybrid) {
+    entry(fmt::format("{} fisheye landmarks", picture.fisheye_points.size()), kFisheyePointColor,
+          false);
+    entry("fisheye path", kFisheyePathColor, true);
+  }
   if (!picture.truth.empty()) entry("truth", kTruthColor, true);
+}
+
+// Only what is finite, in every list.
+MapPicture drawable(MapPicture picture) {
+  for (Points* const list :
+       {&picture.points, &picture.path, &picture.truth, &picture.keyframes, &picture.fisheye_points,
+        &picture.fisheye_path, &picture.fisheye_truth, &picture.fisheye_keyframes}) {
+    *list = only_finite(*list);
+  }
+  return picture;
+}
+
+// All that must be seen whole.
+Points all_paths(const MapPicture& picture) {
+  Points all = picture.path;
+  for (const Points* const list : {&picture.truth, &picture.fisheye_path, &picture.fisheye_truth}) {
+    all.insert(all.end(), list->begin(), list->end());
+  }
+  return all;
+}
+
+void draw(const MapPicture& picture, Panel& panel) {
+  panel.draw_frame();
+  panel.draw_points(picture.points, kPointColor);
+  panel.draw_points(picture.fisheye_points, kFisheyePointColor);
+  for (const Points* const truth : {&picture.truth, &picture.fisheye_truth}) {
+    panel.draw_path(*truth, kTruthColor, 4);
+  }
+  panel.draw_path(picture.fisheye_path, kFisheyePathColor, 2);
+  panel.draw_keyframes(picture.fisheye_keyframes, kFisheyePathColor);
+  panel.draw_path(picture.path, kPathColor, 2);
+  panel.draw_keyframes(picture.keyframes, kPathColor);
+  panel.draw_ends(picture.path);
+  panel.draw_scale_bar();
 }
 
 }  // namespace
 
-void write_map_picture(const std::filesystem::path& path, const MapPicture& picture) {
-  const Points points = only_finite(picture.points);
-  const Points camera = only_finite(picture.path);
-  const Points truth = only_finite(picture.truth);
+void write_map_picture(const std::filesystem::path& path, const MapPicture& given) {
+  const MapPicture picture = drawable(given);
+  Points points = picture.points;
+  points.insert(points.end(), picture.fisheye_points.begin(), picture.fisheye_points.end());
+  const Points paths = all_paths(picture);
   cv::Mat image(kTop + kPanelHeight + kBottom, 2 * (kLeft + kPanelWidth + kMargin), CV_8UC3,
                 cv::Scalar(255, 255, 255));
   draw_legend(image, picture);
   int left = 0;
-  for (const View& view : choose_views(camera)) {
-    Panel panel(image, left, view, robust_range(points, camera, truth, view.right),
-                robust_range(points, camera, truth, view.up));
-    panel.draw_frame();
-    panel.draw_points(points);
-    panel.draw_path(truth, kTruthColor, 4);
-    panel.draw_path(camera, kPathColor, 2);
-    panel.draw_ends(camera);
-    panel.draw_scale_bar();
+  for (const View& view : choose_views(picture.path)) {
+    Panel panel(image, left, view, robust_range(points, paths, view.right),
+                robust_range(points, paths, view.up));
+    draw(picture, panel);
     left += kLeft + kPanelWidth + kMargin;
   }
   std::vector<uchar> bytes;

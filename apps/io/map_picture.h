@@ -11,9 +11,15 @@ namespace hybrid_slam {
 // What is drawn; all in one world frame [m] whose first camera looks along z, y down.
 struct MapPicture {
   std::string title;
-  std::vector<Eigen::Vector3d> points;  // landmarks
-  std::vector<Eigen::Vector3d> path;    // the camera, in the order of time
-  std::vector<Eigen::Vector3d> truth;   // aligned to the path; empty where there is none
+  std::vector<Eigen::Vector3d> points;     // landmarks
+  std::vector<Eigen::Vector3d> path;       // the camera, in the order of time
+  std::vector<Eigen::Vector3d> truth;      // aligned to the path; empty where there is none
+  std::vector<Eigen::Vector3d> keyframes;  // positions of the camera
+  // The same of the fisheye; empty where there is none.
+  std::vector<Eigen::Vector3d> fisheye_points;  // landmarks that it found, not among `points`
+  std::vector<Eigen::Vector3d> fisheye_path;
+  std::vector<Eigen::Vector3d> fisheye_truth;
+  std::vector<Eigen::Vector3d> fisheye_keyframes;
 };
 
 // Draws points and paths from above and from the side into one PNG. A path that leads forward is

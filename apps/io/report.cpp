@@ -62,6 +62,13 @@ Json to_json(const RelativeError& error) {
           {"rotation_deg", to_json(error.rotation, 180 / std::numbers::pi)}};
 }
 
+Json to_json(const HybridError& error) {
+  return {{"translation_m", to_json(error.translation)},
+          {"rotation_deg", to_json(error.rotation, 180 / std::numbers::pi)},
+          {"registered", error.registered},
+          {"total", error.total}};
+}
+
 void write_json(const std::filesystem::path& path, const Json& json) {
   // Text from outside (a path, a warning) need not be valid UTF-8.
   write_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "apps/io/hybrid_error.h"
 #include "apps/io/stage_times.h"
 #include "apps/io/trajectory.h"
 
@@ -22,6 +23,9 @@ nlohmann::ordered_json to_json(const AbsoluteError& error);
 
 // "translation_m", "rotation_deg".
 nlohmann::ordered_json to_json(const RelativeError& error);
+
+// "translation_m", "rotation_deg", "registered", "total".
+nlohmann::ordered_json to_json(const HybridError& error);
 
 // Indented, whole or not at all. Throws OutputError.
 void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& json);

@@ -9,22 +9,25 @@ RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
   const std::size_t total = run.frames_of(source.size());
   Recorder recorder(result, hooks, total);
   LocalMapping mapping(options);
-  FrameTracking tracking(source, options, mapping.add_camera(source.camera()), recorder,
-                         result.times);
+  FrameTracking tracking(source, options, mapping, recorder, result.times);
   CheckpointSchedule checkpoints(run.checkpoint_every);
   const auto publish = [&] { result.map = mapping.snapshot(); };
-  publish();
-
-  OrderedLoader loader(source, run.threads, indices_below(total));
-  while (auto frame = tracking.next(loader)) {
-    const auto job = tracking.track(std::move(*frame), *result.map);
+  const auto add_keyframe = [&](const std::optional<MappingJob>& job) {
     if (!job) {
-      continue;
+      return;
     }
-    recorder.became_keyframe(job->frame_index(), mapping.process(*job, result.times, {}, publish));
+    recorder.became_keyframe(job->camera, job->frame_index(),
+                             mapping.process(*job, result.times, {}, publish));
     if (checkpoints.due()) {
       recorder.failed(save_checkpoint(hooks.checkpoint, *result.map, result.times));
     }
+  };
+  publish();
+
+  OrderedLoader loader(source, run.threads, indices_below(total));
+  while (auto frames = tracking.next(loader)) {
+    add_keyframe(tracking.track(std::move(frames->stereo), *result.map));
+    add_keyframe(tracking.track_fisheye(std::move(*frames), *result.map));
   }
   loader.stop();
   loader.join();

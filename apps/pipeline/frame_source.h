@@ -1,7 +1,8 @@
 #pragma once
 
-#include <cstddef>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "apps/io/stage_times.h"
 #include "apps/pipeline/slam_options.h"
@@ -11,13 +12,20 @@
 
 namespace hybrid_slam {
 
-// Turns one index into a frame ready to be tracked. Used by one thread at a time.
+// What all cameras saw at one moment, ready to be tracked.
+struct FrameSet {
+  Frame stereo;
+  std::optional<Frame> fisheye;  // none without such a camera, or if its image cannot be read
+  std::string fisheye_error;     // why it cannot
+};
+
+// Turns one index into frames ready to be tracked. Used by one thread at a time.
 class FrameLoader {
  public:
   virtual ~FrameLoader() = default;
 
-  // Throws InputError if what the frame is made of cannot be read: the frame counts as corrupt.
-  virtual Frame load(std::size_t index, StageTimes& times) = 0;
+  // Throws InputError if what the stereo frame is made of cannot be read: it counts as corrupt.
+  virtual FrameSet load(std::size_t index, StageTimes& times) = 0;
 };
 
 // Where frames come from: images of a dataset, or a simulation of features. Const functions may be
@@ -27,22 +35,29 @@ class FrameSource {
   virtual ~FrameSource() = default;
   virtual std::size_t size() const = 0;
   virtual const Calibrated<RectifiedStereo>& camera() const = 0;
-  virtual std::unique_ptr<FrameLoader> make_loader() const = 0;  // one per thread
+  virtual const Calibrated<KannalaBrandt>* fisheye() const { return nullptr; }  // null: none
+  virtual std::unique_ptr<FrameLoader> make_loader() const = 0;                 // one per thread
 };
 
-// Frames from images: decoding, SIFT in both, stereo matching. `sequence` must outlive it.
+// Frames from images: decoding, SIFT in all of them, stereo matching. `sequence` must outlive it.
 class ImageFrameSource final : public FrameSource {
  public:
-  ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options)
-      : sequence_(sequence), options_(options) {}
+  // Looks at a few fisheye images, if there is such a camera, for what they show of the world.
+  // Throws InputError as make_fisheye_mask() does.
+  ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options);
 
   std::size_t size() const override { return sequence_.size(); }
   const Calibrated<RectifiedStereo>& camera() const override { return sequence_.info().stereo; }
+  const Calibrated<KannalaBrandt>* fisheye() const override {
+    const auto& fisheye = sequence_.info().fisheye;
+    return fisheye ? &*fisheye : nullptr;
+  }
   std::unique_ptr<FrameLoader> make_loader() const override;
 
  private:
   const ImageSequence& sequence_;
   SlamOptions options_;
+  GrayImage fisheye_mask_;  // empty without a fisheye
 };
 
 }  // namespace hybrid_slam

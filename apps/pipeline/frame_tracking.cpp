@@ -4,32 +4,64 @@
 
 namespace hybrid_slam {
 
-std::optional<Frame> FrameTracking::next(OrderedLoader& loader) {
+FrameTracking::FrameTracking(const FrameSource& source, const SlamOptions& options,
+                             LocalMapping& mapping, Recorder& recorder, StageTimes& times)
+    : stereo_(mapping.add_camera(source.camera()), source.camera(), options.tracking),
+      recorder_(recorder),
+      times_(times) {
+  if (source.fisheye() != nullptr) {
+    fisheye_.emplace(mapping.add_camera(*source.fisheye()), *source.fisheye(),
+                     options.fisheye.tracking);
+  }
+}
+
+std::optional<FrameSet> FrameTracking::next(OrderedLoader& loader) {
   while (!recorder_.cancelled()) {
     auto loaded = loader.next();
     if (!loaded) {
       recorder_.cancelled();  // which can be why nothing comes any more
       break;
     }
-    if (loaded->frame) {
-      return std::move(loaded->frame);
+    if (loaded->frames) {
+      return std::move(loaded->frames);
     }
     recorder_.corrupt(loaded->error);
   }
   return std::nullopt;
 }
 
-std::optional<MappingJob> FrameTracking::track(Frame frame, const MapSnapshot& map,
+std::optional<MappingJob> FrameTracking::track(Frame stereo, const MapSnapshot& map,
                                                bool allow_keyframe) {
   StageClock clock(times_);
-  TrackedFrame tracked = tracker_.track(std::move(frame), map, allow_keyframe);
+  TrackedFrame tracked = stereo_.track(std::move(stereo), map, allow_keyframe);
   clock.lap("track");
+  stereo_reference_ = tracked.reference;
+  return finish(CameraKind::kStereo, std::move(tracked), map);
+}
+
+std::optional<MappingJob> FrameTracking::track_fisheye(FrameSet frames, const MapSnapshot& map,
+                                                       bool allow_keyframe) {
+  if (!frames.fisheye_error.empty()) {
+    recorder_.fisheye_missing(frames.fisheye_error);
+  }
+  if (!frames.fisheye || !fisheye_) {
+    return std::nullopt;
+  }
+  StageClock clock(times_);
+  TrackedFrame tracked =
+      fisheye_->track(std::move(*frames.fisheye), map, stereo_reference_, allow_keyframe);
+  clock.lap("track_fisheye");
+  return finish(CameraKind::kFisheye, std::move(tracked), map);
+}
+
+std::optional<MappingJob> FrameTracking::finish(CameraKind camera, TrackedFrame tracked,
+                                                const MapSnapshot& map) {
   append_counts(tracked.counts, counts_);
-  recorder_.tracked(tracked, map);
+  recorder_.tracked(camera, tracked, map);
   if (!tracked.keyframe) {
     return std::nullopt;
   }
-  return MappingJob{std::move(*tracked.keyframe), std::exchange(counts_, {})};
+  return MappingJob{camera, std::move(*tracked.keyframe), std::exchange(counts_, {})};
 }
 
 }  // namespace hybrid_slam

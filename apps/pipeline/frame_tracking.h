@@ -5,6 +5,8 @@
 #include "apps/pipeline/local_mapping.h"
 #include "apps/pipeline/ordered_loader.h"
 #include "apps/pipeline/recorder.h"
+#include "frontend/tracking/fisheye_tracker.h"
+#include "frontend/tracking/stereo_tracker.h"
 
 namespace hybrid_slam {
 
@@ -12,21 +14,30 @@ namespace hybrid_slam {
 // gathers what the next keyframe takes along. One thread.
 class FrameTracking {
  public:
-  FrameTracking(const FrameSource& source, const SlamOptions& options, CameraId camera,
-                Recorder& recorder, StageTimes& times)
-      : tracker_(camera, source.camera(), options.tracking), recorder_(recorder), times_(times) {}
+  // Adds the source's cameras to the map.
+  FrameTracking(const FrameSource& source, const SlamOptions& options, LocalMapping& mapping,
+                Recorder& recorder, StageTimes& times);
 
-  // Waits for the next frame that could be read. None at the end, or when the run is cancelled.
-  std::optional<Frame> next(OrderedLoader& loader);
+  // Waits for the next frames that could be read. None at the end, or when the run is cancelled.
+  std::optional<FrameSet> next(OrderedLoader& loader);
 
   // What mapping has to do, if the frame shall become a keyframe.
-  std::optional<MappingJob> track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);
+  std::optional<MappingJob> track(Frame stereo, const MapSnapshot& map, bool allow_keyframe = true);
+
+  // The same of the fisheye's frame, after the stereo frame of the same time; nothing if it has
+  // none.
+  std::optional<MappingJob> track_fisheye(FrameSet frames, const MapSnapshot& map,
+                                          bool allow_keyframe = true);
 
  private:
-  StereoTracker tracker_;
+  std::optional<MappingJob> finish(CameraKind camera, TrackedFrame tracked, const MapSnapshot& map);
+
+  StereoTracker stereo_;
+  std::optional<FisheyeTracker> fisheye_;
   Recorder& recorder_;
   StageTimes& times_;
-  MapEdit counts_;  // since the last keyframe
+  KeyframeId stereo_reference_;  // of the last stereo frame; invalid if that was lost
+  MapEdit counts_;               // since the last keyframe
 };
 
 }  // namespace hybrid_slam

@@ -6,7 +6,7 @@
 #include <stop_token>
 
 #include "apps/io/stage_times.h"
-#include "apps/pipeline/slam_options.h"
+#include "apps/pipeline/slam_run.h"
 #include "backend/backend.h"
 #include "frontend/mapping/culling.h"
 
@@ -14,6 +14,7 @@ namespace hybrid_slam {
 
 // A frame that shall become a keyframe, and what tracking counted since the last one.
 struct MappingJob {
+  CameraKind camera = CameraKind::kStereo;
   NewKeyframe keyframe;
   MapEdit counts;
 

@@ -56,9 +56,9 @@ void OrderedLoader::work() {
         ticket = begun_++;
       }
       ticket_lock.unlock();
-      LoadedFrame loaded{*index, std::nullopt, {}};
+      LoadedFrames loaded{*index, std::nullopt, {}};
       try {
-        loaded.frame = loader->load(*index, times);
+        loaded.frames = loader->load(*index, times);
       } catch (const InputError& error) {
         loaded.error = error.what();
       }
@@ -77,7 +77,7 @@ void OrderedLoader::work() {
   changed_.notify_all();
 }
 
-std::optional<LoadedFrame> OrderedLoader::next() {
+std::optional<LoadedFrames> OrderedLoader::next() {
   std::unique_lock lock(mutex_);
   changed_.wait(
       lock, [this] { return failure_ != nullptr || ready_.contains(consumed_) || working_ == 0; });
@@ -88,7 +88,7 @@ std::optional<LoadedFrame> OrderedLoader::next() {
   if (at == ready_.end()) {
     return std::nullopt;
   }
-  LoadedFrame loaded = std::move(at->second);
+  LoadedFrames loaded = std::move(at->second);
   ready_.erase(at);
   ++consumed_;
   changed_.notify_all();

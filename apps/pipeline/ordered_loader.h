@@ -15,10 +15,10 @@
 
 namespace hybrid_slam {
 
-// What became of one index: a frame, or the reason why there is none.
-struct LoadedFrame {
+// What became of one index: frames, or the reason why there are none.
+struct LoadedFrames {
   std::size_t index = 0;
-  std::optional<Frame> frame;
+  std::optional<FrameSet> frames;
   std::string error;
 };
 
@@ -35,7 +35,7 @@ class OrderedLoader {
   OrderedLoader& operator=(const OrderedLoader&) = delete;
 
   // Waits for the next frame; none after the last. Rethrows what a loader threw beside InputError.
-  std::optional<LoadedFrame> next();
+  std::optional<LoadedFrames> next();
 
   // No further frame is begun; next() delivers what is under way.
   void stop();
@@ -55,8 +55,8 @@ class OrderedLoader {
   std::mutex ticket_mutex_;   // held while an index and its place in the order are drawn
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
-  std::map<std::size_t, LoadedFrame> ready_;  // by ticket
-  std::size_t begun_ = 0;                     // tickets drawn
+  std::map<std::size_t, LoadedFrames> ready_;  // by ticket
+  std::size_t begun_ = 0;                      // tickets drawn
   std::size_t consumed_ = 0;
   int working_ = 0;  // threads that may still deliver
   bool stopped_ = false;

@@ -66,7 +66,12 @@ class MappingWorker {
 
   // After finish().
   const StageTimes& times() const { return times_; }
-  const std::vector<std::pair<std::int64_t, KeyframeId>>& keyframes() const { return keyframes_; }
+  struct Added {
+    CameraKind camera;
+    std::int64_t frame_index;
+    KeyframeId id;
+  };
+  const std::vector<Added>& keyframes() const { return keyframes_; }
 
  private:
   void work() {
@@ -78,8 +83,8 @@ class MappingWorker {
           const std::lock_guard lock(mutex_);
           current_ = stop;
         }
-        keyframes_.emplace_back(job->frame_index(),
-                                mapping_.process(*job, times_, stop.get_token(), publish));
+        const KeyframeId id = mapping_.process(*job, times_, stop.get_token(), publish);
+        keyframes_.push_back({job->camera, job->frame_index(), id});
         checkpoints_.keyframe_added(snapshots_.get());
       }
     } catch (...) {
@@ -94,10 +99,10 @@ class MappingWorker {
   Channel<MappingJob> jobs_;
   Latest<MapSnapshot> snapshots_;
   std::mutex mutex_;
-  std::stop_source current_;                                    // guarded by mutex_
-  StageTimes times_;                                            // the thread's own until finish()
-  std::vector<std::pair<std::int64_t, KeyframeId>> keyframes_;  // likewise
-  std::exception_ptr failure_;                                  // likewise
+  std::stop_source current_;      // guarded by mutex_
+  StageTimes times_;              // the thread's own until finish()
+  std::vector<Added> keyframes_;  // likewise
+  std::exception_ptr failure_;    // likewise
   std::jthread thread_;
 };
 
@@ -107,30 +112,43 @@ void report_failures(CheckpointWorker& checkpoints, Recorder& recorder) {
   }
 }
 
+// Hands a keyframe to mapping. Where time presses, the one before is cut short. The first one
+// starts the map, without which there is nothing to track against. False if the worker has failed.
+bool add_keyframe(std::optional<MappingJob> job, MappingWorker& mapping, bool paced) {
+  if (!job) {
+    return true;
+  }
+  if (paced) {
+    mapping.hurry();
+  }
+  const bool first = !mapping.snapshot()->origin().valid();
+  const std::size_t version = mapping.version();
+  if (!mapping.add(std::move(*job))) {
+    return false;
+  }
+  if (first) {
+    mapping.wait_for_map(version);
+  }
+  return true;
+}
+
 // Tracks in the calling thread until the images end or the run is cancelled. Images that come at
 // their own pace press for time; others wait for tracking, which waits for mapping, so that it is
-// never more than one keyframe ahead.
+// never more than one keyframe of each camera ahead.
 void track_all(OrderedLoader& loader, FrameTracking& tracking, MappingWorker& mapping,
                CheckpointWorker& checkpoints, bool paced, Recorder& recorder) {
-  while (auto frame = tracking.next(loader)) {
+  while (auto frames = tracking.next(loader)) {
     report_failures(checkpoints, recorder);
     if (!paced) {
       mapping.wait_until_taken();
     }
-    const auto map = mapping.snapshot();
-    auto job = tracking.track(std::move(*frame), *map, mapping.has_room());
-    if (!job) {
-      continue;
-    }
-    if (paced) {
-      mapping.hurry();
-    }
-    const std::size_t version = mapping.version();
-    if (!mapping.add(std::move(*job))) {
+    auto job = tracking.track(std::move(frames->stereo), *mapping.snapshot(), mapping.has_room());
+    if (!add_keyframe(std::move(job), mapping, paced)) {
       break;
     }
-    if (!map->origin().valid()) {
-      mapping.wait_for_map(version);
+    job = tracking.track_fisheye(std::move(*frames), *mapping.snapshot(), mapping.has_room());
+    if (!add_keyframe(std::move(job), mapping, paced)) {
+      break;
     }
   }
 }
@@ -143,8 +161,7 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
   const std::size_t total = run.frames_of(source.size());
   Recorder recorder(result, hooks, total);
   LocalMapping local_mapping(options);
-  FrameTracking tracking(source, options, local_mapping.add_camera(source.camera()), recorder,
-                         result.times);
+  FrameTracking tracking(source, options, local_mapping, recorder, result.times);
   CheckpointWorker checkpoints(hooks.checkpoint, run.checkpoint_every);
   MappingWorker mapping(local_mapping, checkpoints);
   std::optional<PacedCamera> camera;
@@ -170,8 +187,8 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
   mapping.rethrow();
   checkpoints.finish();
   report_failures(checkpoints, recorder);
-  for (const auto& [frame, id] : mapping.keyframes()) {
-    recorder.became_keyframe(frame, id);
+  for (const auto& [kind, frame, id] : mapping.keyframes()) {
+    recorder.became_keyframe(kind, frame, id);
   }
   result.times.merge(loader.times());
   result.times.merge(mapping.times());

@@ -16,6 +16,12 @@ void Recorder::corrupt(const std::string& reason) {
   report();
 }
 
+void Recorder::fisheye_missing(const std::string& reason) {
+  ++result_.fisheye_frames.read;
+  ++result_.fisheye_frames.corrupt;
+  warn(reason);
+}
+
 void Recorder::failed(const std::optional<RunFailure>& failure) {
   if (!failure) {
     return;
@@ -32,21 +38,25 @@ void Recorder::warn(const std::string& text) {
   }
 }
 
-void Recorder::tracked(const TrackedFrame& frame, const MapSnapshot& map) {
-  ++result_.frames.read;
-  ++(frame.tracked() ? result_.frames.tracked : result_.frames.lost);
-  record_of_frame_[frame.frame_index] = result_.records.size();
+void Recorder::tracked(CameraKind camera, const TrackedFrame& frame, const MapSnapshot& map) {
+  const bool stereo = camera == CameraKind::kStereo;
+  FrameCounts& counts = stereo ? result_.frames : result_.fisheye_frames;
+  auto& records = stereo ? result_.records : result_.fisheye_records;
+  ++counts.read;
+  ++(frame.tracked() ? counts.tracked : counts.lost);
+  record_of_frame_[{camera, frame.frame_index}] = records.size();
   FrameRecord record{frame, std::nullopt};
   record.frame.keyframe.reset();
   record.frame.counts = {};
-  result_.records.push_back(std::move(record));
+  records.push_back(std::move(record));
   progress_.keyframes = map.keyframe_count();
   progress_.landmarks = map.landmark_count();
-  report();
+  if (stereo) report();
 }
 
-void Recorder::became_keyframe(std::int64_t frame_index, KeyframeId id) {
-  result_.records[record_of_frame_.at(frame_index)].keyframe = id;
+void Recorder::became_keyframe(CameraKind camera, std::int64_t frame_index, KeyframeId id) {
+  auto& records = camera == CameraKind::kStereo ? result_.records : result_.fisheye_records;
+  records[record_of_frame_.at({camera, frame_index})].keyframe = id;
 }
 
 bool Recorder::cancelled() {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <utility>
 
 #include "apps/pipeline/slam_run.h"
 
@@ -16,10 +17,11 @@ class Recorder {
   }
 
   void corrupt(const std::string& reason);
+  void fisheye_missing(const std::string& reason);
   void failed(const std::optional<RunFailure>& failure);  // nothing to do if none
   void dropped(int count) { result_.frames.dropped += count; }
-  void tracked(const TrackedFrame& frame, const MapSnapshot& map);
-  void became_keyframe(std::int64_t frame_index, KeyframeId id);
+  void tracked(CameraKind camera, const TrackedFrame& frame, const MapSnapshot& map);
+  void became_keyframe(CameraKind camera, std::int64_t frame_index, KeyframeId id);
   bool cancelled();  // asked for? Then the result says so
 
  private:
@@ -29,7 +31,7 @@ class Recorder {
   RunResult& result_;
   const RunHooks& hooks_;
   RunProgress progress_;
-  std::map<std::int64_t, std::size_t> record_of_frame_;
+  std::map<std::pair<CameraKind, std::int64_t>, std::size_t> record_of_frame_;
 };
 
 }  // namespace hybrid_slam

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <set>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,7 +22,13 @@ class Section {
   template <typename T>
   Section& field(const char* key, T& value) {
     known_.insert(key);
-    if (yaml_ && yaml_->has(key)) value = yaml_->value<T>(key);
+    if (yaml_ && yaml_->has(key)) {
+      if constexpr (std::is_same_v<T, std::string>) {
+        value = yaml_->text(key);
+      } else {
+        value = yaml_->value<T>(key);
+      }
+    }
     return *this;
   }
 
@@ -151,11 +158,9 @@ void fields_of(S section, TrackRefinementOptions& options) {
       .refuse_unknown();
 }
 
+// What both trackers have; the caller refuses unknown keys.
 template <typename S>
-void fields_of(S section, StereoTrackerOptions& options) {
-  fields_of(section.section("odometer"), options.odometer);
-  fields_of(section.section("disparity"), options.disparity);
-  fields_of(section.section("keyframes"), options.keyframes);
+void shared_fields_of(S& section, TrackerOptions& options) {
   fields_of(section.section("refinement"), options.refinement);
   section.section("matcher")
       .field("max_descriptor_distance", options.matcher.max_descriptor_distance)
@@ -169,6 +174,16 @@ void fields_of(S section, StereoTrackerOptions& options) {
       .field("min_matches", options.relocalization.min_matches)
       .field("min_inliers", options.relocalization.min_inliers)
       .refuse_unknown();
+  section.field("local_map_radius", options.local_map_radius)
+      .field("min_local_map_inliers", options.min_local_map_inliers);
+}
+
+template <typename S>
+void fields_of(S section, StereoTrackerOptions& options) {
+  shared_fields_of(section, options);
+  fields_of(section.section("keyframes"), options.keyframes);
+  fields_of(section.section("odometer"), options.odometer);
+  fields_of(section.section("disparity"), options.disparity);
   section.field("min_initial_share", options.min_initial_share)
       .field("close_baselines", options.close_baselines)
       .field("min_new_points", options.min_new_points)
@@ -177,9 +192,30 @@ void fields_of(S section, StereoTrackerOptions& options) {
       .field("last_frame_min_share", options.last_frame_min_share)
       .field("min_reference_matches", options.min_reference_matches)
       .field("min_pose_inliers", options.min_pose_inliers)
-      .field("local_map_radius", options.local_map_radius)
-      .field("min_local_map_inliers", options.min_local_map_inliers)
       .field("min_odometer_inliers", options.min_odometer_inliers)
+      .refuse_unknown();
+}
+
+template <typename S>
+void fields_of(S section, FisheyeTrackerOptions& options) {
+  shared_fields_of(section, options);
+  section.section("keyframes")
+      .field("min_tracked_ratio", options.keyframes.min_tracked_ratio)
+      .field("min_inliers", options.keyframes.min_inliers)
+      .field("max_frames_between", options.keyframes.max_frames_between)
+      .field("min_motion", options.keyframes.min_motion)
+      .refuse_unknown();
+  section.refuse_unknown();
+}
+
+template <typename S>
+void fields_of(S section, FisheyeOptions& options) {
+  fields_of(section.section("tracking"), options.tracking);
+  section.field("upsample", options.upsample)
+      .field("max_angle_deg", options.view.max_angle_deg)
+      .field("border", options.view.border)
+      .field("mask", options.view.mask)
+      .field("clahe", options.view.clahe)
       .refuse_unknown();
 }
 
@@ -233,6 +269,7 @@ void fields_of(S top, SlamOptions& options) {
   fields_of(top.section("sift"), options.sift);
   fields_of(top.section("stereo"), options.stereo);
   fields_of(top.section("tracking"), options.tracking);
+  fields_of(top.section("fisheye"), options.fisheye);
   fields_of(top.section("triangulation"), options.triangulation);
   fields_of(top.section("fusion"), options.fusion);
   fields_of(top.section("culling"), options.culling);
@@ -244,9 +281,12 @@ void fields_of(S top, SlamOptions& options) {
 
 void SlamOptions::distribute() {
   sift.max_features = features;
-  tracking.max_features = features;
+  for (TrackerOptions* tracker :
+       {static_cast<TrackerOptions*>(&tracking), static_cast<TrackerOptions*>(&fisheye.tracking)}) {
+    tracker->max_features = features;
+    tracker->relocalization.ransac.seed = seed;
+  }
   tracking.odometer.seed = seed;
-  tracking.relocalization.ransac.seed = seed;
 }
 
 std::string SlamOptions::validate() const {
@@ -254,8 +294,9 @@ std::string SlamOptions::validate() const {
     return "features must lie between 50 and 100000";
   }
   for (const std::string& error :
-       {sift.validate(), stereo.validate(), tracking.validate(), triangulation.validate(),
-        fusion.validate(), culling.validate(), backend.incremental.validate()}) {
+       {sift.validate(), stereo.validate(), tracking.validate(), fisheye.view.validate(),
+        fisheye.tracking.validate(), triangulation.validate(), fusion.validate(),
+        culling.validate(), backend.incremental.validate()}) {
     if (!error.empty()) {
       return error;
     }

@@ -5,13 +5,22 @@
 
 #include "backend/backend.h"
 #include "frontend/features/sift.h"
+#include "frontend/input/fisheye_view.h"
 #include "frontend/mapping/culling.h"
 #include "frontend/mapping/fusion.h"
 #include "frontend/mapping/triangulation.h"
 #include "frontend/matching/stereo_matcher.h"
+#include "frontend/tracking/fisheye_tracker.h"
 #include "frontend/tracking/stereo_tracker.h"
 
 namespace hybrid_slam {
+
+// What concerns the fisheye alone.
+struct FisheyeOptions {
+  bool upsample = true;  // as of SIFT; the rest of its options holds for all cameras
+  FisheyeViewOptions view;
+  FisheyeTrackerOptions tracking;
+};
 
 // Everything that can be set, in one value. Read from YAML at the border only.
 struct SlamOptions {
@@ -20,6 +29,7 @@ struct SlamOptions {
   SiftOptions sift;
   StereoMatcherOptions stereo;
   StereoTrackerOptions tracking;
+  FisheyeOptions fisheye;
   TriangulationOptions triangulation;
   FusionOptions fusion;
   CullingOptions culling;

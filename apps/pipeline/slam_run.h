@@ -29,6 +29,8 @@ struct RunOptions {
   }
 };
 
+enum class CameraKind { kStereo, kFisheye };
+
 struct FrameCounts {
   int read = 0;  // handed to the pipeline, corrupt ones included
   int tracked = 0;
@@ -74,7 +76,9 @@ struct RunHooks {
 
 struct RunResult {
   FrameCounts frames;
-  std::vector<FrameRecord> records;  // every frame that was read, in order
+  std::vector<FrameRecord> records;  // every stereo frame that was read, in order
+  FrameCounts fisheye_frames;        // of those that came with a stereo frame that could be read
+  std::vector<FrameRecord> fisheye_records;
   std::shared_ptr<const MapSnapshot> map;
   StageTimes times;
   bool cancelled = false;

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <numbers>
 #include <string>
 
@@ -10,6 +11,7 @@
 
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
+#include "apps/trajectory_eval/hybrid.h"
 #include "frontend/input/text_file.h"
 
 namespace hybrid_slam {
@@ -25,13 +27,21 @@ constexpr const char* kDescription =
 constexpr const char* kFooter =
     "ate: distance between true and estimated positions after alignment of the whole\n"
     "rpe: error of the motion over --delta pairs; translation and rotation\n"
+    "hybrid: pose of the fisheye relative to the left camera, moment by moment; EST is a folder "
+    "with stereo.tum and fisheye.tum, TRUTH a UWslam sequence or its camera_poses.txt\n"
     "Exit codes: 0 ok, 1 internal error, 2 bad usage, 3 bad input.";
+
+const std::map<std::string, TruthConvention> kTruthConventions{
+    {"auto", TruthConvention::kAuto},
+    {"world_from_cam", TruthConvention::kWorldFromCam},
+    {"cam_from_world", TruthConvention::kCamFromWorld}};
 
 struct Options {
   std::string metric, estimate, truth, times;
   std::string align = "se3";
   double max_difference = 0.02;  // [s]
   std::size_t delta = 1;
+  TruthConvention convention = TruthConvention::kAuto;
   bool json = false;
 };
 
@@ -134,9 +144,9 @@ int run(int argc, char** argv) {
   Options options;
   CLI::App app(kDescription);
   app.footer(kFooter);
-  app.add_option("METRIC", options.metric, "ate or rpe")
+  app.add_option("METRIC", options.metric, "ate, rpe or hybrid")
       ->required()
-      ->check(CLI::IsMember({"ate", "rpe"}));
+      ->check(CLI::IsMember({"ate", "rpe", "hybrid"}));
   app.add_option("EST", options.estimate, "estimated trajectory")->required();
   app.add_option("TRUTH", options.truth, "true trajectory")->required();
   app.add_option("--align", options.align, "se3, sim3 or none (rpe: sim3 applies its scale)")
@@ -149,6 +159,10 @@ int run(int argc, char** argv) {
   app.add_option("--delta", options.delta, "rpe: number of pairs that a motion spans")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  app.add_option("--gt-convention", options.convention,
+                 "hybrid: how the poses of TRUTH are meant; auto (default) says which it took")
+      ->transform(CLI::CheckedTransformer(kTruthConventions).description(""))
+      ->option_text("auto|world_from_cam|cam_from_world");
   app.add_flag("--json", options.json, "print JSON");
   try {
     app.parse(argc, argv);
@@ -157,7 +171,12 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "trajectory_eval: {} (--help tells more)\n", error.what());
     return kBadUsage;
   }
-  evaluate(options);
+  if (options.metric == "hybrid") {
+    evaluate_hybrid(options.estimate, options.truth, options.convention, options.max_difference,
+                    options.json);
+  } else {
+    evaluate(options);
+  }
   return kOk;
 }
 

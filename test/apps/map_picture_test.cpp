@@ -74,9 +74,10 @@ TEST_CASE("pictures of nothing, of one place and of huge maps are drawn") {
   const auto path = folder.path() / "a.png";
   write_map_picture(path, {});
   CHECK(cv::imread(path.string()).cols > 1000);
-  write_map_picture(path, {"one", {{1, 1, 1}}, {{1, 1, 1}, {1, 1, 1}}, {}});
+  write_map_picture(path, {"one", {{1, 1, 1}}, {{1, 1, 1}, {1, 1, 1}}, {}, {}, {}, {}, {}, {}});
   CHECK(count_color(cv::imread(path.string()), kPath) > 50);
-  write_map_picture(path, {"huge", {{1e9, 0, -1e9}}, {{0, 0, 0}, {1e12, 1e12, 1e12}}, {}});
+  write_map_picture(
+      path, {"huge", {{1e9, 0, -1e9}}, {{0, 0, 0}, {1e12, 1e12, 1e12}}, {}, {}, {}, {}, {}, {}});
   CHECK(count_color(cv::imread(path.string()), kPath) > 50);
 }
 

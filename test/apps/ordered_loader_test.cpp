@@ -19,13 +19,13 @@ class StubSource final : public FrameSource {
     class Loader final : public FrameLoader {
      public:
       explicit Loader(const StubSource& source) : source_(source) {}
-      Frame load(std::size_t index, StageTimes& times) override {
+      FrameSet load(std::size_t index, StageTimes& times) override {
         ++source_.begun;
         times.add("load", 1);
         std::this_thread::sleep_for(std::chrono::microseconds(index % 3 == 0 ? 2000 : 10));
         if (index == source_.broken) throw std::logic_error("broken");
         if (index % 10 == 7) throw InputError("unreadable " + std::to_string(index));
-        return make_frame(static_cast<std::int64_t>(index), 0, {}, 10, 10);
+        return {make_frame(static_cast<std::int64_t>(index), 0, {}, 10, 10), {}, {}};
       }
 
      private:
@@ -55,9 +55,9 @@ TEST_CASE("Frames come in order, however many threads load them", "[pipeline]") 
       const auto loaded = loader.next();
       REQUIRE(loaded);
       CHECK(loaded->index == i);
-      CHECK(loaded->frame.has_value() == (i % 10 != 7));
-      if (loaded->frame) {
-        CHECK(loaded->frame->index == static_cast<std::int64_t>(i));
+      CHECK(loaded->frames.has_value() == (i % 10 != 7));
+      if (loaded->frames) {
+        CHECK(loaded->frames->stereo.index == static_cast<std::int64_t>(i));
       } else {
         CHECK(loaded->error == "unreadable " + std::to_string(i));
       }

@@ -209,7 +209,6 @@ TEST_CASE("bad usage is refused with one line and code 2") {
   refused({"data", "--mode", "sometimes"}, "--mode: ");
   refused({"data", "--layout", "tum"}, "--layout: ");
   refused({"data", "--cameras", "mono"}, "--cameras: ");
-  refused({"data", "--cameras", "hybrid"}, "not in this version");
   refused({"data", "--rate", "5"}, "--rate needs --mode realtime");
   refused({"data", "--rate", "5", "--mode", "every-frame"}, "--rate needs --mode realtime");
   refused({"data", "--mode", "realtime", "--rate", "0"}, "--rate: ");

@@ -1,6 +1,9 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
+#include <numbers>
+
+#include <fmt/format.h>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
@@ -52,6 +55,77 @@ TEST_CASE("trajectory_eval prints errors of TUM and KITTI files alike") {
   const Outcome plain = run_eval(folder, "ate e.tum t.tum --align sim3");
   CHECK(plain.code == 0);
   CHECK(plain.out.find("rmse 0.00") != std::string::npos);
+}
+
+// camera_poses.txt as UWslam has it, and times.txt.
+void write_uwslam_truth(const std::filesystem::path& folder, const Trajectory& stereo,
+                        const Trajectory& fisheye, bool inverted) {
+  std::string poses;
+  std::string times;
+  const auto append = [&](const Rigid3d& world_from_cam) {
+    const Rigid3d pose = inverted ? inverse(world_from_cam) : world_from_cam;
+    const auto q = pose.rotation();
+    const auto t = pose.translation();
+    poses += fmt::format(" {} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
+  };
+  for (std::size_t i = 0; i < stereo.size(); ++i) {
+    poses += std::to_string(i);
+    append(fisheye[i].world_from_cam);
+    append(stereo[i].world_from_cam);
+    poses += "\n";
+    times += fmt::format("{}\n", stereo[i].time);
+  }
+  write_text(folder / "camera_poses.txt", poses);
+  write_text(folder / "times.txt", times);
+}
+
+TEST_CASE("trajectory_eval hybrid compares the arm's pose, in either convention") {
+  const TempFolder folder;
+  const Trajectory stereo = winding_path(30);
+  const Rigid3d left_from_fish(Eigen::Quaterniond(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitY())),
+                               {0.5, 0.1, 0.9});
+  // The estimate's world is another; every pose of the fisheye is 1 cm and 0.5 degrees off.
+  const Rigid3d other(Eigen::Quaterniond(Eigen::AngleAxisd(2, Eigen::Vector3d::UnitX())),
+                      {1, 2, 3});
+  const double half_degree = 0.5 * std::numbers::pi / 180;
+  const Rigid3d error(Eigen::Quaterniond(Eigen::AngleAxisd(half_degree, Eigen::Vector3d::UnitZ())),
+                      {0, 0.01, 0});
+  Trajectory fisheye = stereo;
+  Trajectory estimated_stereo = stereo;
+  Trajectory estimated_fisheye = stereo;
+  for (std::size_t i = 0; i < stereo.size(); ++i) {
+    fisheye[i].world_from_cam = stereo[i].world_from_cam * left_from_fish;
+    estimated_stereo[i].world_from_cam = other * stereo[i].world_from_cam;
+    estimated_fisheye[i].world_from_cam = other * fisheye[i].world_from_cam * error;
+  }
+  estimated_fisheye.erase(estimated_fisheye.begin() + 4, estimated_fisheye.begin() + 7);
+  for (const char* const run : {"run", "late"}) {
+    std::filesystem::create_directory(folder.path() / run);
+  }
+  write_tum(folder.path() / "run/stereo.tum", estimated_stereo);
+  write_tum(folder.path() / "run/fisheye.tum", estimated_fisheye);
+  for (const std::string convention : {"world_from_cam", "cam_from_world"}) {
+    write_uwslam_truth(folder.path(), stereo, fisheye, convention == "cam_from_world");
+    const Outcome outcome = run_eval(folder, "hybrid run . --json --gt-convention " + convention);
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    const auto json = nlohmann::json::parse(outcome.out);
+    CHECK(json["convention"] == convention);
+    CHECK(json["registered"] == 27);
+    CHECK(json["total"] == 30);
+    CHECK(json["translation_m"]["mean"].get<double>() == Approx(0.01).epsilon(1e-4));
+    CHECK(json["rotation_deg"]["median"].get<double>() == Approx(0.5).epsilon(1e-4));
+  }
+  const Outcome plain =
+      run_eval(folder, "hybrid run camera_poses.txt --gt-convention cam_from_world");
+  CHECK(plain.out.find("27 of 30 fisheye frames (90.0 %)") != std::string::npos);
+  CHECK(run_eval(folder, "hybrid nowhere .").code == 3);
+  const Trajectory long_after{{1e6, {}}};
+  write_tum(folder.path() / "late/stereo.tum", long_after);
+  write_tum(folder.path() / "late/fisheye.tum", long_after);
+  const Outcome late = run_eval(folder, "hybrid late .");
+  CHECK(late.code == 3);
+  CHECK(late.err.find("no moment has both poses") != std::string::npos);
 }
 
 TEST_CASE("trajectory_eval documents and uses its exit codes") {

@@ -50,17 +50,17 @@ const ImageSequence* kitti() {
 
 StereoFeatures load(const FrameSource& source, std::size_t index) {
   StageTimes times;
-  return source.make_loader()->load(index, times).features;
+  return source.make_loader()->load(index, times).stereo.features;
 }
 
 void sift(benchmark::State& state) {
-  const StereoImages images = kitti()->read(0);
+  const FrameImages images = kitti()->read(0);
   const auto extractor = make_sift(slam_options().sift);
   for (auto _ : state) benchmark::DoNotOptimize(extractor->extract(images.left, nullptr));
 }
 
 // `images`: null where there are features only, which are then not aligned.
-void stereo_match(benchmark::State& state, const FrameSource& source, const StereoImages* images) {
+void stereo_match(benchmark::State& state, const FrameSource& source, const FrameImages* images) {
   const StereoFeatures features = load(source, 0);
   std::unique_ptr<const ImagePyramid> left, right;
   if (images != nullptr) {
@@ -112,7 +112,7 @@ const bool kRegistered = [] {
   static const ImageFrameSource kSource(*kitti(), slam_options());
   add("kitti/sift", sift);
   add("kitti/stereo_match", [](benchmark::State& state) {
-    const StereoImages images = kitti()->read(0);
+    const FrameImages images = kitti()->read(0);
     stereo_match(state, kSource, &images);
   });
   add("kitti/odometer", [](benchmark::State& state) { odometer(state, kSource); });

@@ -37,7 +37,8 @@ double position_error(const RunResult& result, const SyntheticScene& scene) {
   int count = 0;
   for (const FrameRecord& record : result.records) {
     if (record.frame.tracked()) {
-      const auto& truth = scene.frames[static_cast<std::size_t>(record.frame.frame_index)];
+      const auto& truth =
+          scene.frames[static_cast<std::size_t>(record.frame.frame_index) * scene.cameras.size()];
       sum += (origin_in_a(result.cam_from_world(record)) - origin_in_a(truth.cam_from_world))
                  .squaredNorm();
       ++count;

@@ -6,22 +6,31 @@
 namespace hybrid_slam {
 namespace {
 
+Frame without_features(const Frame& frame) {
+  StereoFeatures none;
+  none.left.kind = none.right.kind = frame.features.left.kind;
+  return make_frame(frame.index, frame.time, std::move(none), 64, 64);
+}
+
 class SimulatedLoader final : public FrameLoader {
  public:
   explicit SimulatedLoader(const SimulatedSource& source) : source_(source) {}
 
-  Frame load(std::size_t index, StageTimes&) override {
+  FrameSet load(std::size_t index, StageTimes&) override {
     if (source_.corrupt.contains(index)) {
       throw InputError("frame " + std::to_string(index) + ": made unreadable by the test");
     }
-    Frame frame = stereo_frame(source_.scene(), index);
-    if (source_.blank.contains(index)) {
-      StereoFeatures none;
-      none.left.kind = none.right.kind = frame.features.left.kind;
-      frame = make_frame(frame.index, frame.time, std::move(none), source_.camera().width,
-                         source_.camera().height);
+    FrameSet frames{stereo_frame(source_.stereo_truth(index), source_.camera()), {}, {}};
+    if (source_.blank.contains(index)) frames.stereo = without_features(frames.stereo);
+    if (source_.fisheye_missing.contains(index)) {
+      frames.fisheye_error = "frame " + std::to_string(index) + ": no fisheye image";
+    } else if (source_.fisheye() != nullptr) {
+      frames.fisheye = mono_frame(source_.fisheye_truth(index), *source_.fisheye());
+      if (source_.fisheye_blank.contains(index)) {
+        frames.fisheye = without_features(*frames.fisheye);
+      }
     }
-    return frame;
+    return frames;
   }
 
  private:

@@ -8,22 +8,36 @@
 
 namespace hybrid_slam {
 
-// The stereo frames of a synthetic scene as a source of frames: tracking and mapping without
-// images.
+// The frames of a synthetic scene with a stereo pair, and perhaps a fisheye, as a source of frames:
+// tracking and mapping without images.
 class SimulatedSource final : public FrameSource {
  public:
   explicit SimulatedSource(SyntheticScene scene) : scene_(std::move(scene)) {}
 
-  std::size_t size() const override { return scene_.frames.size(); }
+  std::size_t size() const override { return scene_.frames.size() / scene_.cameras.size(); }
   const Calibrated<RectifiedStereo>& camera() const override {
     return std::get<Calibrated<RectifiedStereo>>(scene_.cameras.front());
   }
+  const Calibrated<KannalaBrandt>* fisheye() const override {
+    return scene_.cameras.size() > 1 ? &std::get<Calibrated<KannalaBrandt>>(scene_.cameras[1])
+                                     : nullptr;
+  }
   std::unique_ptr<FrameLoader> make_loader() const override;
+
+  // What is known of the frames of moment `index`.
+  const SyntheticFrame& stereo_truth(std::size_t index) const {
+    return scene_.frames[index * scene_.cameras.size()];
+  }
+  const SyntheticFrame& fisheye_truth(std::size_t index) const {
+    return scene_.frames[index * scene_.cameras.size() + 1];
+  }
 
   const SyntheticScene& scene() const { return scene_; }
 
-  std::set<std::size_t> corrupt;  // indices that cannot be read
-  std::set<std::size_t> blank;    // indices without a single feature
+  std::set<std::size_t> corrupt;          // indices that cannot be read
+  std::set<std::size_t> blank;            // indices without a single feature in the stereo pair
+  std::set<std::size_t> fisheye_blank;    // likewise, of the fisheye
+  std::set<std::size_t> fisheye_missing;  // indices at which the fisheye's image cannot be read
 
  private:
   SyntheticScene scene_;

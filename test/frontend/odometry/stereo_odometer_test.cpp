@@ -16,7 +16,7 @@ namespace hybrid_slam {
 namespace {
 
 StereoFeatures extract(const ImageSequence& sequence, SiftExtractor& sift, std::size_t frame) {
-  const StereoImages images = sequence.read(frame);
+  const FrameImages images = sequence.read(frame);
   const ImagePyramid left(images.left), right(images.right);
   return match_stereo(sift.extract(images.left, nullptr), sift.extract(images.right, nullptr),
                       &left, &right, sequence.info().stereo, {});
