@@ -104,7 +104,7 @@ class RowMatcher {
 
   // Ties go to the lower index.
   RowMatch choose(const std::vector<int>& candidates,
-              const std::vector<std::int32_t>& distances) const {
+                  const std::vector<std::int32_t>& distances) const {
     RowMatch best;
     for (std::size_t k = 0; k < candidates.size(); ++k) {
       if (best.index >= 0 && distances[k] >= best.distance) continue;

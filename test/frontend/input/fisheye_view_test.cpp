@@ -59,7 +59,7 @@ TEST_CASE("the image circle is found where there is one") {
     CHECK(std::abs(*found - circle) <= 3);
   }
   CHECK(!find_image_circle(camera(), circle_image(1000, 40)));  // reaches to the corners
-  CHECK(!find_image_circle(camera(), circle_image(150, -5)));    // as dark inside
+  CHECK(!find_image_circle(camera(), circle_image(150, -5)));   // as dark inside
   CHECK(!find_image_circle(camera(),
                            GrayImage{kSize, kSize, std::vector<std::uint8_t>(kSize * kSize)}));
 }
