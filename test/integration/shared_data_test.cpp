@@ -1,8 +1,11 @@
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <numbers>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -18,7 +21,33 @@ struct Outcome {
   AbsoluteError error;  // SE3 alignment
   FrameCounts fisheye_frames;
   std::optional<HybridError> hybrid;
+  std::shared_ptr<const MapSnapshot> map;
 };
+
+// Median of |log2(measured / predicted)| over keypoints of one kind of camera whose landmarks were
+// found by the other: the scale as the map predicts it from the keyframe that found the landmark.
+double scale_mismatch(const MapSnapshot& map, bool from_stereo) {
+  const auto is_stereo = [&](KeyframeId id) { return baseline(map.camera(map.at(id))) > 0; };
+  std::vector<double> octaves;
+  for (const LandmarkId id : map.landmark_ids()) {
+    const Landmark& landmark = map.at(id);
+    for (const Observation& observation : landmark.observations) {
+      const Keyframe& keyframe = map.at(observation.keyframe);
+      if (is_stereo(landmark.reference) != from_stereo || is_stereo(keyframe.id) == from_stereo) {
+        continue;
+      }
+      const double distance = (keyframe.cam_from_world * landmark.point_in_world).norm();
+      const double predicted =
+          focal_length(map.camera(keyframe)) * landmark.object_scale / distance;
+      const double measured = keyframe.observations->features.keypoints[observation.keypoint].scale;
+      octaves.push_back(std::abs(std::log2(measured / predicted)));
+    }
+  }
+  REQUIRE(octaves.size() > 100);
+  std::nth_element(octaves.begin(), octaves.begin() + static_cast<long>(octaves.size() / 2),
+                   octaves.end());
+  return octaves[octaves.size() / 2];
+}
 
 Trajectory trajectory(const RunResult& result, const std::vector<FrameRecord>& records) {
   Trajectory poses;
@@ -51,7 +80,7 @@ std::optional<Outcome> run_sequence(const std::string& dataset, const std::strin
   const auto error =
       absolute_error(associate(estimate, sequence->info().truth, 0.02), TrajectoryAlignment::kSe3);
   REQUIRE(error);
-  Outcome outcome{result.frames, *error, result.fisheye_frames, std::nullopt};
+  Outcome outcome{result.frames, *error, result.fisheye_frames, std::nullopt, result.map};
   if (cameras == SequenceCameras::kHybrid) {
     outcome.hybrid = hybrid_error(estimate, trajectory(result, result.fisheye_records),
                                   sequence->info().truth, sequence->info().fisheye_truth, 0.02);
@@ -90,6 +119,9 @@ TEST_CASE("On the rendered mound every fisheye frame is placed, well within a mi
     CHECK(outcome->hybrid->registered == 40);
     CHECK(outcome->hybrid->translation.mean < 0.0007);
     CHECK(outcome->hybrid->rotation.mean < 0.055 * std::numbers::pi / 180);
+    // Focal lengths of 868 and 303 px are 1.5 octaves apart; measured: a fifth of an octave.
+    CHECK(scale_mismatch(*outcome->map, true) < 0.3);
+    CHECK(scale_mismatch(*outcome->map, false) < 0.3);
   }
 }
 
