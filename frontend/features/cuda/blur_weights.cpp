@@ -54,12 +54,31 @@ std::vector<std::vector<double>> level_weights(double initial_sigma, int layers)
   return kernels;
 }
 
+std::vector<std::vector<double>> all_weights(const SiftOptions& options) {
+  std::vector<std::vector<double>> kernels =
+      level_weights(options.initial_sigma, options.octave_layers);
+  kernels.push_back(first_level_weights(options.initial_sigma, options.upsample));
+  return kernels;
+}
+
+std::string why_blurs_too_large(const SiftOptions& options) {
+  const std::string too_large = "initial_sigma is too large for CUDA's SIFT";
+  double reach = 0;  // before kernels are made: they would be of any size
+  for (int level = 1; level < options.octave_layers + 3; ++level) {
+    reach += sift::kKernelSigmas *
+             sift::level_step_sigma(options.initial_sigma, options.octave_layers, level);
+  }
+  if (!(reach <= kMaxReach)) return too_large;
+  const std::vector<std::vector<double>> kernels = all_weights(options);
+  const bool fit = std::all_of(kernels.begin(), kernels.end(),
+                               [](const auto& kernel) { return reach_of(kernel) <= kMaxReach; });
+  return fit ? std::string() : too_large;
+}
+
 std::vector<float> padded_weights(const std::vector<std::vector<double>>& kernels) {
   std::vector<float> weights(kernels.size() * kMaxTaps);
   for (std::size_t k = 0; k < kernels.size(); ++k) {
-    if (reach_of(kernels[k]) > kMaxReach) {
-      throw std::invalid_argument("SIFT options: initial_sigma is too large for the CUDA engine");
-    }
+    if (reach_of(kernels[k]) > kMaxReach) throw std::logic_error("a kernel reaches too far");
     std::transform(kernels[k].begin(), kernels[k].end(),
                    weights.begin() + static_cast<std::ptrdiff_t>(k * kMaxTaps),
                    [](double weight) { return static_cast<float>(weight); });

@@ -6,12 +6,15 @@ namespace hybrid_slam {
 
 std::string why_no_cuda() {
   int count = 0;
-  const cudaError_t error = cudaGetDeviceCount(&count);
-  if (error != cudaSuccess) {
-    cudaGetLastError();  // or a later call would report it
-    return cudaGetErrorString(error);
+  cudaError_t error = cudaGetDeviceCount(&count);
+  if (error == cudaSuccess && count == 0) error = cudaErrorNoDevice;
+  cudaFuncAttributes kernel;  // none if this was not compiled for such a device
+  if (error == cudaSuccess) {
+    error = cudaFuncGetAttributes(&kernel, cuda::run_kernel<cuda::FindExtrema>);
   }
-  return count > 0 ? "" : "no CUDA device";
+  if (error == cudaSuccess) return {};
+  cudaGetLastError();  // or a later call would report it
+  return std::string("no CUDA device: ") + cudaGetErrorString(error);
 }
 
 CudaSift::CudaSift(const SiftOptions& options) : engine_(std::make_unique<Engine>(options)) {}
@@ -28,10 +31,8 @@ void CudaSift::start(const GrayImage& image, const GrayImage* mask) {
 
 FeatureSet CudaSift::finish() { return engine_->sift.finish(); }
 
-void CudaSift::time_stages(bool timed) { engine_->sift.backend().time_stages(timed); }
+void CudaSift::time(CudaTiming timing) { engine_->sift.backend().time(timing); }
 
-std::vector<std::pair<std::string, double>> CudaSift::stage_times() const {
-  return engine_->sift.backend().stage_times();
-}
+CudaStageTimes CudaSift::stage_times() const { return engine_->sift.backend().stage_times(); }
 
 }  // namespace hybrid_slam

@@ -2,14 +2,13 @@
 
 #include <memory>
 #include <string>
-#include <utility>
-#include <vector>
 
+#include "frontend/features/cuda/cuda_timing.h"
 #include "frontend/features/sift.h"
 
 namespace hybrid_slam {
 
-// Empty if there is a device that kernels can run on, else why not.
+// Empty if there is a device that these kernels can run on, else why not.
 std::string why_no_cuda();
 
 // SIFT as defined in frontend/features/definition on a CUDA device. Every instance has a stream and
@@ -30,10 +29,9 @@ class CudaSift final : public SiftExtractor {
   // Waits for what was started last and returns its features.
   FeatureSet finish();
 
-  // Milliseconds of the device per stage of the image last finished, for measurements: with this,
-  // work is not recorded as a graph, which takes longer as a whole.
-  void time_stages(bool timed);
-  std::vector<std::pair<std::string, double>> stage_times() const;
+  // Times of the image last finished are there if timing was on when it was started.
+  void time(CudaTiming timing);
+  CudaStageTimes stage_times() const;
 
  private:
   friend class CudaFeatures;

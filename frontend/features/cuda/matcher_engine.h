@@ -58,8 +58,9 @@ class MatcherEngine {
     const Pairs from = list_pairs(previous, 0);
     const Pairs to = list_pairs(current, 1);
     if (from.count == 0 || to.count == 0) return {};
-    backend_.begin_stage("match");
+    backend_.begin_stage("upload");
     backend_.upload(chosen_, host_chosen_, static_cast<std::size_t>(4 * capacity_) * sizeof(int));
+    backend_.begin_stage("match");
     const auto side = [&](const DescriptorsView& a, const int* of_a, const DescriptorsView& b,
                           const int* of_b, std::size_t number) {
       const DescriptorsView query = gather(a, of_a, from.count, 2 * number);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/features/cuda/cuda_timing.h"
 #include "frontend/features/cuda/parallel.h"
 
 namespace hybrid_slam::cuda {
@@ -70,8 +71,12 @@ class OnDevice {
   void download(void* to, const void* from, std::size_t bytes) {
     check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream_), "download");
   }
+  void copy(void* to, const void* from, std::size_t bytes) {
+    check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToDevice, stream_), "copy");
+  }
   void upload_now(void* to, const void* from, std::size_t bytes) {
-    check(cudaMemcpy(to, from, bytes, cudaMemcpyHostToDevice), "upload");
+    upload(to, from, bytes);
+    wait();
   }
 
   template <typename Kernel>
@@ -84,26 +89,12 @@ class OnDevice {
 
   template <typename Launches>
   void record(const Launches& launches) {
-    if (timed_) {
-      used_stages_ = 0;
+    if (timing_ == CudaTiming::kStages) {
       launches();
       return;
     }
-    if (record_ == nullptr) {
-      check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "record");
-      cudaGraph_t graph = nullptr;
-      try {
-        launches();
-      } catch (...) {
-        cudaStreamEndCapture(stream_, &graph);
-        if (graph != nullptr) cudaGraphDestroy(graph);
-        throw;
-      }
-      check(cudaStreamEndCapture(stream_, &graph), "record");
-      const cudaError_t error = cudaGraphInstantiate(&record_, graph, 0);
-      cudaGraphDestroy(graph);
-      check(error, "record");
-    }
+    begin_stage("kernels");
+    if (record_ == nullptr) make_record(launches);
     check(cudaGraphLaunch(record_, stream_), "run");
   }
   void forget() {
@@ -112,10 +103,12 @@ class OnDevice {
   }
   void wait() { check(cudaStreamSynchronize(stream_), "wait"); }
 
-  // With this, stages are timed, and nothing is recorded.
-  void time_stages(bool timed) { timed_ = timed; }
+  // A stage ends where the next begins, the last one where `nullptr` begins.
+  void time(CudaTiming timing) { timing_ = timing; }
   void begin_stage(const char* name) {
-    if (!timed_) return;
+    if (timing_ == CudaTiming::kOff || recording_) return;
+    if (ended_) used_stages_ = 0;
+    ended_ = name == nullptr;
     if (used_stages_ == stages_.size()) {
       cudaEvent_t event = nullptr;
       check(cudaEventCreate(&event), "event");
@@ -124,9 +117,9 @@ class OnDevice {
     stages_[used_stages_].first = name;
     check(cudaEventRecord(stages_[used_stages_++].second, stream_), "event");
   }
-  // Of the last run, after wait() [ms].
-  std::vector<std::pair<std::string, double>> stage_times() const {
-    std::vector<std::pair<std::string, double>> times;
+  // Of the last run, after wait().
+  CudaStageTimes stage_times() const {
+    CudaStageTimes times;
     for (std::size_t i = 0; i + 1 < used_stages_; ++i) {
       float milliseconds = 0;
       check(cudaEventElapsedTime(&milliseconds, stages_[i].second, stages_[i + 1].second), "event");
@@ -138,6 +131,25 @@ class OnDevice {
   cudaStream_t stream() const { return stream_; }
 
  private:
+  template <typename Launches>
+  void make_record(const Launches& launches) {
+    check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "record");
+    recording_ = true;
+    cudaGraph_t graph = nullptr;
+    try {
+      launches();
+    } catch (...) {
+      recording_ = false;
+      cudaStreamEndCapture(stream_, &graph);
+      if (graph != nullptr) cudaGraphDestroy(graph);
+      throw;
+    }
+    recording_ = false;
+    check(cudaStreamEndCapture(stream_, &graph), "record");
+    const cudaError_t error = cudaGraphInstantiate(&record_, graph, 0);
+    cudaGraphDestroy(graph);
+    check(error, "record");
+  }
   void drop_record() {
     if (record_ != nullptr) cudaGraphExecDestroy(record_);
     record_ = nullptr;
@@ -147,7 +159,9 @@ class OnDevice {
   cudaGraphExec_t record_ = nullptr;
   std::vector<void*> device_memory_;
   std::vector<void*> host_memory_;
-  bool timed_ = false;
+  bool recording_ = false;
+  CudaTiming timing_ = CudaTiming::kOff;
+  bool ended_ = true;
   std::size_t used_stages_ = 0;
   std::vector<std::pair<const char*, cudaEvent_t>> stages_;
 };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -40,8 +42,10 @@ class SiftEngine {
       : backend_(std::forward<BackendArguments>(arguments)...),
         options_(checked(options)),
         grid_blocks_((options.max_features + 255) / 256) {
-    kernels_ = level_weights(options_.initial_sigma, options_.octave_layers);
-    kernels_.push_back(first_level_weights(options_.initial_sigma, options_.upsample));
+    if (const std::string why = why_blurs_too_large(options_); !why.empty()) {
+      throw std::invalid_argument("SIFT options: " + why);
+    }
+    kernels_ = all_weights(options_);
     padded_weights_ = padded_weights(kernels_);
   }
 
@@ -53,8 +57,12 @@ class SiftEngine {
 
   // Of the image last started; valid until the next start(). Null pointers if it is too small.
   FeaturesView features() const {
-    if (octaves_of(width_, height_) == 0) return {};
+    if (octaves_of(width_, height_) == 0) return {nullptr, 0, nullptr, nullptr};
     return {&results_.counts[1], options_.max_features, results_.keypoints, results_.descriptors};
+  }
+  // After finish().
+  int finished_count() const {
+    return octaves_of(width_, height_) == 0 ? 0 : results_at(host_results_).counts[1];
   }
   const ScaleSpace& scale_space() const { return scale_space_; }
   Backend& backend() { return backend_; }

@@ -43,9 +43,9 @@ FeatureSet SiftEngine<Backend>::finish() {
 template <typename Backend>
 void SiftEngine<Backend>::run() {
   const std::size_t size = static_cast<std::size_t>(width_) * height_;
+  backend_.begin_stage("upload");
+  backend_.upload(pixels_, host_pixels_, masked_ ? 2 * size : size);
   backend_.record([&] {
-    backend_.begin_stage("upload");
-    backend_.upload(pixels_, host_pixels_, masked_ ? 2 * size : size);
     backend_.begin_stage("scale space");
     make_scale_space();
     backend_.begin_stage("extrema");
@@ -54,10 +54,10 @@ void SiftEngine<Backend>::run() {
     spread(sorting_.spread, kGridBlocks);
     backend_.launch({kGridBlocks}, GatherExtrema{sorting_, selected_});
     make_features();
-    backend_.begin_stage("download");
-    backend_.download(host_results_, results_.counts, results_.bytes);
-    backend_.begin_stage(nullptr);
   });
+  backend_.begin_stage("download");
+  backend_.download(host_results_, results_.counts, results_.bytes);
+  backend_.begin_stage(nullptr);
 }
 
 template <typename Backend>

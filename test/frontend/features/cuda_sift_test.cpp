@@ -216,8 +216,12 @@ TEST_CASE("CUDA's SIFT refuses blurs that reach too far") {
   SiftOptions options;
   options.initial_sigma = 3.0;
   CHECK_NOTHROW(SiftEngine<OnHost>(options));
-  options.initial_sigma = 4.0;
-  CHECK_THROWS_AS(SiftEngine<OnHost>(options), std::invalid_argument);
+  CHECK(why_blurs_too_large(options).empty());
+  for (const double sigma : {4.0, 1e6, 1e300}) {
+    options.initial_sigma = sigma;
+    CHECK_FALSE(why_blurs_too_large(options).empty());
+    CHECK_THROWS_AS(SiftEngine<OnHost>(options), std::invalid_argument);
+  }
 }
 
 }  // namespace
