@@ -19,8 +19,9 @@ constexpr const char* kFooter = R"(Writes to DIR:
   timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
   summary.json       frames, keyframes, landmarks, options, and ATE where the dataset has truth
 
-Exit codes: 0 done; 1 internal error; 2 bad usage; 3 bad input (dataset, configuration or output
-folder); 4 no frame could be tracked; 130 interrupted, what there was is saved.)";
+Exit codes: 0 done; 1 internal error; 2 bad usage, or no such device; 3 bad input (dataset,
+configuration or output folder); 4 no frame could be tracked; 130 interrupted, what there was is
+saved.)";
 
 // A check of an option's text, with what to say of one that fails.
 CLI::Validator must_be(bool (*check)(const std::string&), const std::string& complaint) {
@@ -40,11 +41,22 @@ bool is_count(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
 }
 
+// The device that was asked for; none if it cannot be used, which has been reported.
+std::optional<SiftDevice> choose_device(const std::string& name, const SiftOptions& options) {
+  if (name == "cpu") return SiftDevice::kCpu;
+  const std::string why_not = why_no_cuda_sift(options);
+  if (why_not.empty()) return SiftDevice::kCuda;
+  if (name == "auto") return SiftDevice::kCpu;
+  spdlog::error("--device cuda: {}", why_not);
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code) {
   CommandLine line;
   std::string config;
+  std::string device = "auto";
   std::optional<int> features;
   std::optional<std::uint64_t> seed;
   const std::map<std::string, SequenceLayout> layouts{{"auto", SequenceLayout::kAuto},
@@ -98,6 +110,12 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       ->check(must_be(is_count, "is no number from 0"));
   app.add_option("--threads", line.threads, "that extract features (default: one per core)")
       ->check(CLI::Range(1, 256).description(""));
+  app.add_option(
+         "--device", device,
+         "that extracts features: auto (default: cuda where it can be used, else cpu), cpu or "
+         "cuda")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}).description(""))
+      ->option_text("NAME");
   app.add_option("--limit", line.limit, "process so many frames at most")
       ->check(CLI::PositiveNumber.description(""));
   app.add_option("--checkpoint-every", line.checkpoint_every,
@@ -124,6 +142,12 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   line.options.features = features.value_or(line.options.features);
   line.options.seed = seed.value_or(line.options.seed);
   line.options.distribute();
+  const auto chosen_device = choose_device(device, line.options.sift);
+  if (!chosen_device) {
+    exit_code = kExitBadUsage;
+    return std::nullopt;
+  }
+  line.device = *chosen_device;
   if (line.threads == 0) {
     line.threads = default_thread_count();
   }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "apps/pipeline/slam_options.h"
+#include "frontend/features/sift_device.h"
 #include "frontend/input/image_sequence.h"
 
 namespace hybrid_slam {
@@ -20,8 +21,9 @@ struct CommandLine {
   TruthConvention truth_convention = TruthConvention::kAuto;
   std::string out = "out";
   RunMode mode = RunMode::kEveryFrame;
-  double rate = 0;  // [Hz]; 0: images wait for the pipeline
-  int threads = 0;  // 0: one per core
+  double rate = 0;                       // [Hz]; 0: images wait for the pipeline
+  int threads = 0;                       // 0: one per core
+  SiftDevice device = SiftDevice::kCpu;  // that SIFT runs on
   std::size_t limit = 0;
   int checkpoint_every = 0;  // keyframes; 0: never
   bool quiet = false;

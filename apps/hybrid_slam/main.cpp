@@ -70,7 +70,7 @@ int run(const CommandLine& line) {
   options.rate = line.rate;
   options.checkpoint_every = line.checkpoint_every;
 
-  const ImageFrameSource source(*sequence, line.options);
+  const ImageFrameSource source(*sequence, line.options, line.device);
   const auto start = std::chrono::steady_clock::now();
   const RunResult result = line.mode == RunMode::kRealtime
                                ? run_realtime(source, line.options, options, hooks)

@@ -168,6 +168,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
       sequence.truth_convention.empty() ? Json() : Json(sequence.truth_convention);
   json["options"] = options_json(line, sequence.fisheye.has_value());
   json["seed"] = line.options.seed;
+  json["sift_engine"] = to_string(line.device);
   json["blas"] = blas_name();
   json["git_commit"] = kGitCommit;
   return json;

@@ -29,13 +29,13 @@ std::vector<GrayImage> example_images(const ImageSequence& sequence) {
 
 class ImageFrameLoader final : public FrameLoader {
  public:
-  ImageFrameLoader(const ImageSequence& sequence, const SlamOptions& options,
+  ImageFrameLoader(const ImageSequence& sequence, const SlamOptions& options, SiftDevice device,
                    const GrayImage& fisheye_mask)
       : sequence_(sequence),
         options_(options),
         fisheye_mask_(fisheye_mask),
-        sift_(make_sift(options.sift)) {
-    if (sequence.info().fisheye) fisheye_sift_ = make_sift(fisheye_sift(options));
+        sift_(make_sift_on(device, options.sift)) {
+    if (sequence.info().fisheye) fisheye_sift_ = make_sift_on(device, fisheye_sift(options));
   }
 
   FrameSet load(std::size_t index, StageTimes& times) override {
@@ -84,8 +84,9 @@ class ImageFrameLoader final : public FrameLoader {
 
 }  // namespace
 
-ImageFrameSource::ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options)
-    : sequence_(sequence), options_(options) {
+ImageFrameSource::ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options,
+                                   SiftDevice device)
+    : sequence_(sequence), options_(options), device_(device) {
   if (sequence.info().fisheye) {
     fisheye_mask_ =
         make_fisheye_mask(*sequence.info().fisheye, example_images(sequence), options.fisheye.view);
@@ -93,7 +94,7 @@ ImageFrameSource::ImageFrameSource(const ImageSequence& sequence, const SlamOpti
 }
 
 std::unique_ptr<FrameLoader> ImageFrameSource::make_loader() const {
-  return std::make_unique<ImageFrameLoader>(sequence_, options_, fisheye_mask_);
+  return std::make_unique<ImageFrameLoader>(sequence_, options_, device_, fisheye_mask_);
 }
 
 }  // namespace hybrid_slam

@@ -7,6 +7,7 @@
 #include "apps/io/stage_times.h"
 #include "apps/pipeline/slam_options.h"
 #include "cameras/camera.h"
+#include "frontend/features/sift_device.h"
 #include "frontend/input/image_sequence.h"
 #include "frontend/tracking/frame.h"
 
@@ -44,7 +45,8 @@ class ImageFrameSource final : public FrameSource {
  public:
   // Looks at a few fisheye images, if there is such a camera, for what they show of the world.
   // Throws InputError as make_fisheye_mask() does.
-  ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options);
+  ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options,
+                   SiftDevice device = SiftDevice::kCpu);
 
   std::size_t size() const override { return sequence_.size(); }
   const Calibrated<RectifiedStereo>& camera() const override { return sequence_.info().stereo; }
@@ -57,6 +59,7 @@ class ImageFrameSource final : public FrameSource {
  private:
   const ImageSequence& sequence_;
   SlamOptions options_;
+  SiftDevice device_;
   GrayImage fisheye_mask_;  // empty without a fisheye
 };
 

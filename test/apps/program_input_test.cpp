@@ -4,6 +4,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "frontend/features/sift_device.h"
 #include "test/apps/program_run.h"
 #include "test/apps/rendered_survey.h"
 #include "test/support/temp_folder.h"
@@ -218,6 +219,8 @@ TEST_CASE("bad usage is refused with one line and code 2") {
   refused({"data", "--features", "10"}, "--features: ");
   refused({"data", "--features", "many"}, "--features");
   refused({"data", "--threads", "0"}, "--threads: ");
+  refused({"data", "--device", "tpu"}, "--device: ");
+  if (!why_no_cuda_sift({}).empty()) refused({"data", "--device", "cuda"}, "--device cuda: ");
   refused({"data", "--seed", "-1"}, "--seed");
   refused({"data", "--limit", "-3"}, "--limit");
   refused({"data", "--limit", "0"}, "--limit");

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "apps/io/trajectory.h"
+#include "frontend/features/sift_device.h"
 #include "test/apps/program_run.h"
 #include "test/apps/rendered_survey.h"
 #include "test/support/temp_folder.h"
@@ -19,6 +20,10 @@ using Json = nlohmann::json;
 constexpr double kMaxAte = 0.003;  // [m]; the path is 1.6 m long, the ground 2 m away
 constexpr const char* kResults[] = {"stereo.tum", "stereo_online.tum", "map.hslam",   "map.ply",
                                     "map.png",    "timing.json",       "summary.json"};
+
+std::string engine_by_default() {
+  return to_string(why_no_cuda_sift({}).empty() ? SiftDevice::kCuda : SiftDevice::kCpu);
+}
 
 void check_frames(const Json& summary, int read, int tracked, int corrupt = 0) {
   INFO(summary.dump(1));
@@ -75,6 +80,7 @@ TEST_CASE("hybrid_slam tracks a survey and writes what it documents") {
   CHECK(summary["interrupted"] == false);
   CHECK(summary["internal_errors"] == Json::array());
   CHECK(summary["seed"] == 7);
+  CHECK(summary["sift_engine"] == engine_by_default());
   CHECK(summary["options"]["features"] == 400);
   CHECK(summary["options"]["mode"] == "every-frame");
   CHECK(summary["blas"].get<std::string>().find("blas") != std::string::npos);
@@ -142,12 +148,14 @@ TEST_CASE("every-frame runs give the same bytes, whatever the number of threads"
 TEST_CASE("realtime mode tracks every frame when images wait for it") {
   const TempFolder folder;
   write_kitti_survey(folder.path() / "data");
-  const Outcome outcome = run_slam(folder.path(), "data", {"--mode", "realtime"});
+  const Outcome outcome =
+      run_slam(folder.path(), "data", {"--mode", "realtime", "--device", "auto"});
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
   const Json summary = check_results(folder.path() / "out");
   check_frames(summary, kSurveyFrames, kSurveyFrames);
   CHECK(summary["options"]["mode"] == "realtime");
+  CHECK(summary["sift_engine"] == engine_by_default());
   CHECK(summary["ate"]["position_m"]["rmse"].get<double>() < kMaxAte);
 }
 
@@ -177,8 +185,9 @@ TEST_CASE("options come from the file, and the command line goes before it") {
   write_kitti_survey(folder.path() / "data");
   write_text(folder.path() / "options.yaml",
              "features: 700\nseed: 3\nsift:\n  upsample: false\n  contrast_threshold: 1.5\n");
-  const std::vector<std::string> arguments{"data", "--config", "options.yaml", "--seed",
-                                           "4",    "--quiet",  "--limit",      "2"};
+  const std::vector<std::string> arguments{"data",     "--config", "options.yaml", "--seed",
+                                           "4",        "--quiet",  "--limit",      "2",
+                                           "--device", "cpu"};
   const Outcome outcome = run_program(HYBRID_SLAM, arguments, folder.path());
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
@@ -188,6 +197,7 @@ TEST_CASE("options come from the file, and the command line goes before it") {
   CHECK(summary["options"]["upsample"] == false);
   CHECK(summary["options"]["contrast_threshold"] == 1.5);
   CHECK(summary["seed"] == 4);
+  CHECK(summary["sift_engine"] == "cpu");
 }
 
 TEST_CASE("the other layouts are found out and tracked alike") {
@@ -257,7 +267,7 @@ TEST_CASE("help is printed, with layouts, results and exit codes") {
   CHECK(outcome.err.empty());
   for (const char* const word :
        {"--layout", "--sequence", "--config", "--out", "--mode", "--rate", "--cameras",
-        "--features", "--seed", "--threads", "--limit", "--checkpoint-every", "--quiet",
+        "--features", "--seed", "--threads", "--device", "--limit", "--checkpoint-every", "--quiet",
         "stereo_online.tum", "Exit codes", "130"}) {
     INFO(word);
     CHECK(outcome.out.find(word) != std::string::npos);

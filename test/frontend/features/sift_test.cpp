@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include "frontend/features/sift_device.h"
 #include "test/frontend/features/feature_agreement.h"
 #include "test/frontend/features/host_cuda_sift.h"
 #include "test/frontend/features/test_images.h"
@@ -28,12 +29,20 @@ struct Engine {
 // What holds for every engine is tested on every one. OpenCV's is the reference for the others, and
 // what the tests ask for is no more than it gives.
 const std::vector<Engine>& engines() {
-  static const std::vector<Engine> kEngines = {
-      {"CPU", DescriptorKind::kRootSift, make_sift},
-      {"CUDA's kernels on the host", DescriptorKind::kRootSift,
-       [](const SiftOptions& options) { return std::make_unique<HostCudaSift>(options); }},
-      {"OpenCV", DescriptorKind::kRootSiftOpenCv, make_opencv_sift},
-  };
+  static const std::vector<Engine> kEngines = [] {
+    std::vector<Engine> list = {
+        {"CPU", DescriptorKind::kRootSift, make_sift},
+        {"CUDA's kernels on the host", DescriptorKind::kRootSift,
+         [](const SiftOptions& options) { return std::make_unique<HostCudaSift>(options); }},
+        {"OpenCV", DescriptorKind::kRootSiftOpenCv, make_opencv_sift},
+    };
+    if (why_no_cuda_sift({}).empty()) {
+      list.push_back({"CUDA", DescriptorKind::kRootSift, [](const SiftOptions& options) {
+                        return make_sift_on(SiftDevice::kCuda, options);
+                      }});
+    }
+    return list;
+  }();
   return kEngines;
 }
 
@@ -196,6 +205,20 @@ TEST_CASE("SIFT without upsampling leaves out the finest features") {
   const FeatureSet features = engine.make(options)->extract(image, nullptr);
   CHECK(nearest(features, blobs[0], 1) == nullptr);
   CHECK(nearest(features, blobs[1], 1) != nullptr);
+}
+
+TEST_CASE("SIFT on a device that cannot be used is refused, on the CPU it is the CPU's") {
+  const GrayImage image = texture(90, 80, 7);
+  CHECK(same_bytes(make_sift_on(SiftDevice::kCpu, {})->extract(image, nullptr),
+                   make_sift({})->extract(image, nullptr)));
+  CHECK(to_string(SiftDevice::kCpu) == "cpu");
+  CHECK(to_string(SiftDevice::kCuda) == "cuda");
+  const std::string why_not = why_no_cuda_sift({});
+  CHECK(why_not.find('\n') == std::string::npos);
+  if (!why_not.empty()) CHECK_THROWS_AS(make_sift_on(SiftDevice::kCuda, {}), std::runtime_error);
+  SiftOptions blurred;
+  blurred.initial_sigma = 10;
+  CHECK_FALSE(why_no_cuda_sift(blurred).empty());
 }
 
 TEST_CASE("SIFT refuses options and images that cannot be") {
