@@ -32,6 +32,7 @@ set(errors 0)
 file(GLOB_RECURSE files RELATIVE ${ROOT}
   ${ROOT}/cameras/*.h ${ROOT}/cameras/*.cpp ${ROOT}/factors/*.h ${ROOT}/factors/*.cpp
   ${ROOT}/backend/*.h ${ROOT}/backend/*.cpp ${ROOT}/frontend/*.h ${ROOT}/frontend/*.cpp
+  ${ROOT}/frontend/*.cu ${ROOT}/frontend/*.cuh
   ${ROOT}/apps/*.h ${ROOT}/apps/*.cpp)
 foreach(file IN LISTS files)
   room_of(${file} room)
