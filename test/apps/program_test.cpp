@@ -213,11 +213,13 @@ TEST_CASE("the other layouts are found out and tracked alike") {
   for (const bool inverted : {false, true}) {
     DYNAMIC_SECTION("UWslam, truth " << (inverted ? "cam_from_world" : "world_from_cam")) {
       write_uwslam_survey(folder.path() / "data", inverted);
-      const Outcome outcome = run_slam(folder.path(), "data");
+      const Outcome outcome = run_slam(folder.path(), "data", {"--cameras", "stereo"});
       INFO(outcome.err);
       REQUIRE(outcome.code == 0);
       const Json summary = check_results(folder.path() / "out");
       check_frames(summary, kSurveyFrames, kSurveyFrames);
+      CHECK_FALSE(summary.contains("fisheye"));
+      CHECK(summary["options"]["cameras"] == "stereo");
       CHECK(summary["layout"] == "uwslam");
       CHECK(summary["truth_convention"] == (inverted ? "cam_from_world" : "world_from_cam"));
       CHECK(summary["ate"]["position_m"]["rmse"].get<double>() < kMaxAte);

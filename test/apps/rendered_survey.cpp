@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Pair = std::array<std::string, 2>;  // left and right, as PNG files
+using Images = std::array<std::string, 3>;  // left, right and fisheye, as PNG files
 
 std::string encode_png(GrayImage image) {
   const cv::Mat pixels(image.height, image.width, CV_8UC1, image.pixels.data());
@@ -25,16 +25,33 @@ std::string encode_png(GrayImage image) {
   return {bytes.begin(), bytes.end()};
 }
 
-// Rendered once per process.
-const std::vector<Pair>& survey_images() {
-  static const std::vector<Pair> images = [] {
-    const TexturedGround ground = TexturedGround::with_steps();
-    std::vector<Pair> pairs;
-    for (int i = 0; i < kSurveyFrames; ++i) {
-      pairs.push_back({encode_png(ground.render(survey_camera(), survey_pose(i), false)),
-                       encode_png(ground.render(survey_camera(), survey_pose(i), true))});
+// As through a lens that shows no more than 86 degrees to the axis.
+GrayImage render_fisheye(const TexturedGround& ground, const Rigid3d& world_from_fish) {
+  const Camera camera = survey_fisheye();
+  GrayImage image = ground.render(camera, world_from_fish);
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      const auto ray = unproject(camera, Eigen::Vector2d(u, v));
+      if (!ray || ray->z() < std::cos(1.5)) image.row(v)[u] = 4;
     }
-    return pairs;
+  }
+  return image;
+}
+
+// Rendered once per process.
+const std::vector<Images>& survey_images() {
+  static const std::vector<Images> images = [] {
+    const TexturedGround ground = TexturedGround::with_steps();
+    const Rigid3d left_from_right(Eigen::Quaterniond::Identity(),
+                                  Eigen::Vector3d(baseline(survey_camera()), 0, 0));
+    std::vector<Images> frames;
+    for (int i = 0; i < kSurveyFrames; ++i) {
+      frames.push_back(
+          {encode_png(ground.render(survey_camera(), survey_pose(i))),
+           encode_png(ground.render(survey_camera(), survey_pose(i) * left_from_right)),
+           encode_png(render_fisheye(ground, survey_fisheye_pose(i)))});
+    }
+    return frames;
   }();
   return images;
 }
@@ -77,6 +94,15 @@ std::string ros_camera(double p3) {
       camera.width, camera.height, fx, cx, fy, cy, fx, cx, p3, fy, cy);
 }
 
+std::string fisheye_text() {
+  const auto camera = survey_fisheye();
+  const auto& [fx, fy, cx, cy, k1, k2, k3, k4] = camera.params;
+  return fmt::format(
+      "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\n"
+      "k1: {}\nk2: {}\nk3: {}\nk4: {}\n",
+      camera.width, camera.height, fx, fy, cx, cy, k1, k2, k3, k4);
+}
+
 std::string euroc_sensor(double x) {
   const auto camera = survey_camera();
   const auto& [fx, fy, cx, cy, baseline] = camera.params;
@@ -103,6 +129,18 @@ Rigid3d survey_pose(int frame) {
   return {turn, Eigen::Vector3d(0.22 * s - 0.8, 0.03 * std::sin(0.9 * s), 0.03 * s)};
 }
 
+Calibrated<KannalaBrandt> survey_fisheye() {
+  return {{118, 118, 181, 177, -0.01, 0.002, 0, 0}, 360, 360};
+}
+
+Rigid3d survey_fisheye_pose(int frame) {
+  const double s = frame;
+  const Rigid3d stereo_from_fish(
+      Eigen::Quaterniond(Eigen::AngleAxisd(-0.7 + 0.05 * s, Eigen::Vector3d::UnitY())),
+      Eigen::Vector3d(1.2, 0.1 + 0.02 * s, 0.8));
+  return survey_pose(frame) * stereo_from_fish;
+}
+
 fs::path kitti_image(const fs::path& root, bool right, int frame) {
   return root / "sequences/00" / (right ? "image_1" : "image_0") / fmt::format("{:06d}.png", frame);
 }
@@ -110,9 +148,9 @@ fs::path kitti_image(const fs::path& root, bool right, int frame) {
 void write_kitti_survey(const fs::path& root, int frames) {
   std::string times, poses;
   for (int i = 0; i < frames; ++i) {
-    const Pair& pair = survey_images()[static_cast<std::size_t>(there_and_back(i))];
-    write_text(kitti_image(root, false, i), pair[0]);
-    write_text(kitti_image(root, true, i), pair[1]);
+    const Images& images = survey_images()[static_cast<std::size_t>(there_and_back(i))];
+    write_text(kitti_image(root, false, i), images[0]);
+    write_text(kitti_image(root, true, i), images[1]);
     times += fmt::format("{:.6f}\n", kSurveyPeriod * i);
     poses += matrix_row(survey_pose(there_and_back(i)));
   }
@@ -133,15 +171,13 @@ void write_uwslam_survey(const fs::path& root, bool truth_as_cam_from_world) {
       Eigen::Vector3d(1, -4, 3));
   std::string times, poses;
   for (int i = 0; i < kSurveyFrames; ++i) {
-    const Pair& pair = survey_images()[static_cast<std::size_t>(i)];
-    write_text(folder / "images/raw" / fmt::format("{}_left.png", i), pair[0]);
-    write_text(folder / "images/raw" / fmt::format("{}_right.png", i), pair[1]);
+    const Images& images = survey_images()[static_cast<std::size_t>(i)];
+    write_text(folder / "images/raw" / fmt::format("{}_left.png", i), images[0]);
+    write_text(folder / "images/raw" / fmt::format("{}_right.png", i), images[1]);
+    write_text(folder / "images/raw" / fmt::format("{}_fish.png", i), images[2]);
     times += fmt::format("{:.6f}\n", kSurveyPeriod * i);
     const Rigid3d stereo = world_from_start * survey_pose(i);
-    const Rigid3d stereo_from_fish(
-        Eigen::Quaterniond(Eigen::AngleAxisd(-0.7 + 0.05 * i, Eigen::Vector3d::UnitY())),
-        Eigen::Vector3d(1.2, 0.1 + 0.02 * i, 0.8));
-    const Rigid3d fish = stereo * stereo_from_fish;
+    const Rigid3d fish = world_from_start * survey_fisheye_pose(i);
     poses += std::to_string(i);
     for (const Rigid3d& pose : {fish, stereo}) {
       poses += pose_columns(truth_as_cam_from_world ? inverse(pose) : pose);
@@ -152,6 +188,7 @@ void write_uwslam_survey(const fs::path& root, bool truth_as_cam_from_world) {
   write_text(folder / "camera_poses.txt", poses);
   const auto camera = survey_camera();
   write_text(root / "hybrid/calibration/left_camera.yaml", ros_camera(0));
+  write_text(root / "hybrid/calibration/fisheye_calib.yaml", fisheye_text());
   write_text(root / "hybrid/calibration/right_camera.yaml",
              ros_camera(-camera.params[0] * camera.params[4]));
 }

@@ -21,8 +21,11 @@ Rigid3d survey_pose(int frame);  // world_from_cam, up to kSurveyFrames
 // the way back, and forth again.
 void write_kitti_survey(const std::filesystem::path& root, int frames = kSurveyFrames);
 
-// In UWslam's hybrid layout, sequence "M1". The fisheye's poses in the truth are made up, there are
-// no fisheye images.
+// A fisheye nearer to the ground, that turns by itself.
+Calibrated<KannalaBrandt> survey_fisheye();
+Rigid3d survey_fisheye_pose(int frame);  // world_from_cam
+
+// In UWslam's hybrid layout, sequence "M1", with fisheye images.
 void write_uwslam_survey(const std::filesystem::path& root, bool truth_as_cam_from_world);
 
 // In EuRoC's layout, images with no distortion and no truth.

@@ -93,23 +93,18 @@ TexturedGround TexturedGround::with_steps() {
   return TexturedGround(std::move(rectangles));
 }
 
-GrayImage TexturedGround::render(const Calibrated<RectifiedStereo>& camera,
-                                 const Rigid3d& world_from_left, bool right) const {
-  const auto& [fx, fy, cx, cy, baseline] = camera.params;
-  const Rigid3d left_from_eye(Eigen::Quaterniond::Identity(),
-                              Eigen::Vector3d(right ? baseline : 0, 0, 0));
+GrayImage TexturedGround::render(const Camera& camera, const Rigid3d& world_from_cam) const {
   std::vector<SeenGround> rectangles;
   for (const TexturedRectangle& rectangle : rectangles_) {
-    const Rigid3d plane_from_eye =
-        inverse(rectangle.world_from_plane) * world_from_left * left_from_eye;
+    const Rigid3d plane_from_eye = inverse(rectangle.world_from_plane) * world_from_cam;
     rectangles.push_back(
         {&rectangle, plane_from_eye.translation(), plane_from_eye.rotation().toRotationMatrix()});
   }
-  GrayImage image{camera.width, camera.height, {}};
-  image.pixels.reserve(static_cast<std::size_t>(camera.width * camera.height));
-  for (int v = 0; v < camera.height; ++v) {
-    for (int u = 0; u < camera.width; ++u) {
-      const double value = grey(rectangles, Eigen::Vector3d((u - cx) / fx, (v - cy) / fy, 1));
+  GrayImage image{image_width(camera), image_height(camera), {}};
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      const auto ray = unproject(camera, Eigen::Vector2d(u, v));
+      const double value = ray ? grey(rectangles, *ray) : 0;
       image.pixels.push_back(static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0))));
     }
   }

@@ -27,9 +27,8 @@ class TexturedGround {
   // A tilted ground about 2.5 m ahead of the origin (along z) with blocks of several heights on it.
   static TexturedGround with_steps();
 
-  // What the right camera sees, or the left one, whose pose is given.
-  GrayImage render(const Calibrated<RectifiedStereo>& camera, const Rigid3d& world_from_left,
-                   bool right) const;
+  // What a camera sees, the left one of a pair; black where no ray has the pixel.
+  GrayImage render(const Camera& camera, const Rigid3d& world_from_cam) const;
 
  private:
   std::vector<TexturedRectangle> rectangles_;
