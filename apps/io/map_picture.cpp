@@ -6,10 +6,9 @@
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "cameras/output_file.h"
+#include "apps/io/picture_file.h"
 
 namespace hybrid_slam {
 
@@ -324,9 +323,7 @@ void write_map_picture(const std::filesystem::path& path, const MapPicture& give
     draw(picture, panel);
     left += kLeft + kPanelWidth + kMargin;
   }
-  std::vector<uchar> bytes;
-  if (!cv::imencode(".png", image, bytes)) throw std::logic_error("the picture is not encoded");
-  write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  write_picture(path, image);
 }
 
 }  // namespace hybrid_slam

@@ -16,13 +16,17 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Smallest value that at least `percent` of all do not exceed.
-double percentile(const std::vector<double>& sorted, double percent) {
+double percentile_of_sorted(const std::vector<double>& sorted, double percent) {
   const double rank = std::ceil(percent / 100 * static_cast<double>(sorted.size()));
   return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
 }
 
 }  // namespace
+
+double percentile(std::vector<double> values, double percent) {
+  std::sort(values.begin(), values.end());
+  return percentile_of_sorted(values, percent);
+}
 
 Json to_json(const StageTimes& times) {
   Json json = Json::object();
@@ -31,10 +35,12 @@ Json to_json(const StageTimes& times) {
     std::sort(sorted.begin(), sorted.end());
     double sum = 0;
     for (const double duration : sorted) sum += duration;
-    json[stage] = {
-        {"count", sorted.size()},        {"mean", sum / static_cast<double>(sorted.size())},
-        {"p50", percentile(sorted, 50)}, {"p95", percentile(sorted, 95)},
-        {"p99", percentile(sorted, 99)}, {"max", sorted.back()}};
+    json[stage] = {{"count", sorted.size()},
+                   {"mean", sum / static_cast<double>(sorted.size())},
+                   {"p50", percentile_of_sorted(sorted, 50)},
+                   {"p95", percentile_of_sorted(sorted, 95)},
+                   {"p99", percentile_of_sorted(sorted, 99)},
+                   {"max", sorted.back()}};
   }
   return json;
 }

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -11,6 +12,9 @@
 #include "apps/io/trajectory.h"
 
 namespace hybrid_slam {
+
+// Smallest of the values, at least one, that `percent` of all do not exceed.
+double percentile(std::vector<double> values, double percent);
 
 // Per stage: count, mean, p50, p95, p99, max; durations in ms, percentiles by nearest rank.
 nlohmann::ordered_json to_json(const StageTimes& times);
