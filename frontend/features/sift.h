@@ -2,6 +2,8 @@
 
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "backend/map/features.h"
 #include "frontend/features/definition/parameters.h"
@@ -38,6 +40,11 @@ class SiftExtractor {
 
   // `mask`: null, or an image of the same size whose zero pixels must hold no keypoint.
   virtual FeatureSet extract(const GrayImage& image, const GrayImage* mask) = 0;
+
+  // Stages of the image last extracted, in their order, and their milliseconds. Where measuring
+  // makes the whole slower, there are none unless time_stages() asked for them before.
+  virtual std::vector<std::pair<std::string, double>> stage_times() const { return {}; }
+  virtual void time_stages(bool /*timed*/) {}
 };
 
 // The engine for CPUs. Throws std::invalid_argument if the options are not valid.

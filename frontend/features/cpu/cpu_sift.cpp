@@ -25,12 +25,17 @@ bool masked(const GrayImage& mask, const sift::Extremum& extremum) {
 CpuSift::CpuSift(const SiftOptions& options) : options_(checked(options)), scale_space_(options_) {}
 
 FeatureSet CpuSift::extract(const GrayImage& image, const GrayImage* mask) {
+  stages_.start();
   detect(image, mask);
+  stages_.lap("scale space and extrema");
   const std::vector<sift::Extremum> selected = select();
+  stages_.lap("selection");
   Oriented oriented = orient(selected);
+  stages_.lap("orientation");
   FeatureSet features;
   features.kind = DescriptorKind::kRootSift;
   features.descriptors = describe(oriented);
+  stages_.lap("descriptors");
   features.keypoints = std::move(oriented.keypoints);
   return features;
 }

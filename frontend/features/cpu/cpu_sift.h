@@ -1,9 +1,12 @@
 #pragma once
 
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "frontend/features/cpu/scale_space.h"
 #include "frontend/features/sift.h"
+#include "frontend/features/stage_stopwatch.h"
 
 namespace hybrid_slam {
 
@@ -16,6 +19,9 @@ class CpuSift final : public SiftExtractor {
   explicit CpuSift(const SiftOptions& options);
 
   FeatureSet extract(const GrayImage& image, const GrayImage* mask) override;
+  std::vector<std::pair<std::string, double>> stage_times() const override {
+    return stages_.times();
+  }
 
   // All extrema outside of the mask.
   const std::vector<sift::Extremum>& detect(const GrayImage& image, const GrayImage* mask);
@@ -43,6 +49,7 @@ class CpuSift final : public SiftExtractor {
   int width_ = 0;  // of the image last given
   int height_ = 0;
   std::vector<sift::Extremum> extrema_;
+  StageStopwatch stages_;
 };
 
 }  // namespace hybrid_slam
