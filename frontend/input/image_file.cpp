@@ -30,6 +30,7 @@ constexpr std::array<std::uint8_t, 8> kPngSignature{0x89, 'P', 'N', 'G', 0x0d, 0
 std::vector<std::uint8_t> read_bytes(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error)) fail(path, "no such image");
+  if (fs::is_directory(path, error)) fail(path, "is a folder, not an image");
   const std::uintmax_t size = fs::is_regular_file(path, error) ? fs::file_size(path, error) : 0;
   if (error || size > kMaxFileSize) fail(path, "cannot be read");
   if (size == 0) fail(path, "empty image file");
