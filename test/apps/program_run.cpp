@@ -32,12 +32,13 @@ nlohmann::json read_json(const std::filesystem::path& path) {
   return nlohmann::json::parse(read_text(path));
 }
 
-void check_refused(const Outcome& outcome, int code, const std::string& reason) {
+void check_refused(const Outcome& outcome, int code, const std::string& reason,
+                   const std::string& program) {
   INFO("stderr: " << outcome.err);
   INFO("expected: " << reason);
   CHECK(outcome.code == code);
   CHECK(count_lines(outcome.err) == 1);
-  CHECK(count_lines(outcome.err, "hybrid_slam: ") == 1);
+  CHECK(count_lines(outcome.err, program + ": ") == 1);
   CHECK(count_lines(outcome.err, reason) == 1);
   CHECK(outcome.out.empty());
 }

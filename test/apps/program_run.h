@@ -23,8 +23,9 @@ int count_lines(const std::string& text, const std::string& part = "");
 
 nlohmann::json read_json(const std::filesystem::path& path);
 
-// Checks that an attempt ended with `code`, printed exactly one line to stderr, which contains
-// `reason`, and nothing to stdout.
-void check_refused(const Outcome& outcome, int code, const std::string& reason);
+// Checks that an attempt ended with `code`, printed exactly one line to stderr, which names the
+// program and contains `reason`, and nothing to stdout.
+void check_refused(const Outcome& outcome, int code, const std::string& reason,
+                   const std::string& program = "hybrid_slam");
 
 }  // namespace hybrid_slam

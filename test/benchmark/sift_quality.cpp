@@ -10,7 +10,7 @@
 
 #include "frontend/features/cpu/cpu_sift.h"
 #include "test/frontend/features/sift_quality.h"
-#include "test/support/opencv_sift.h"
+#include "apps/feature_eval/opencv_sift.h"
 
 namespace hybrid_slam {
 namespace {

@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 #include "frontend/features/sift.h"
 #include "test/frontend/features/sift_quality.h"
-#include "test/support/opencv_sift.h"
+#include "apps/feature_eval/opencv_sift.h"
 
 namespace hybrid_slam {
 namespace {

@@ -15,7 +15,7 @@
 #include "test/frontend/features/feature_agreement.h"
 #include "test/frontend/features/host_cuda_sift.h"
 #include "test/frontend/features/test_images.h"
-#include "test/support/opencv_sift.h"
+#include "apps/feature_eval/opencv_sift.h"
 
 namespace hybrid_slam {
 namespace {

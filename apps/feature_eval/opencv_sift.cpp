@@ -1,4 +1,4 @@
-#include "test/support/opencv_sift.h"
+#include "apps/feature_eval/opencv_sift.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <opencv2/features2d.hpp>
 
 #include "frontend/features/feature_selection.h"
+#include "frontend/features/stage_stopwatch.h"
 
 namespace hybrid_slam {
 namespace {
@@ -58,6 +59,7 @@ class OpenCvSift final : public SiftExtractor {
 
   FeatureSet extract(const GrayImage& image, const GrayImage* mask) override {
     check_sizes(image, mask);
+    stages_.start();
     FeatureSet features;
     features.kind = DescriptorKind::kRootSiftOpenCv;
     if (std::min(image.width, image.height) < kMinImageSize) return features;
@@ -69,6 +71,7 @@ class OpenCvSift final : public SiftExtractor {
         select_spread(features.keypoints, image.width, image.height, options_.max_features);
     keep(selected, &features.keypoints);
     keep(selected, &found);
+    stages_.lap("detection");
     if (found.empty()) return features;
     cv::Mat descriptors;
     // Leaves keypoints and their order alone: none lies where OpenCV could not describe it.
@@ -79,7 +82,12 @@ class OpenCvSift final : public SiftExtractor {
     for (int i = 0; i < descriptors.rows; ++i) {
       features.descriptors.push_back(to_root_sift(descriptors.ptr<float>(i)));
     }
+    stages_.lap("descriptors");
     return features;
+  }
+
+  std::vector<std::pair<std::string, double>> stage_times() const override {
+    return stages_.times();
   }
 
  private:
@@ -123,6 +131,7 @@ class OpenCvSift final : public SiftExtractor {
 
   SiftOptions options_;
   cv::Ptr<cv::SIFT> sift_;
+  StageStopwatch stages_;
 };
 
 }  // namespace

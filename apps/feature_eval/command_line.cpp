@@ -1,0 +1,93 @@
+#include "apps/feature_eval/command_line.h"
+
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+namespace hybrid_slam {
+namespace {
+
+constexpr const char* kFooter =
+    R"(Writes to DIR, NAME being an image's file name without its ending:
+  extract   NAME_keypoints.csv (x,y,scale,angle,response: pixels and radians, the strongest first)
+            and NAME_keypoints.png, with a circle of three scales around each
+  match     FIRST_NAME_matches.csv (query,train,x1,y1,x2,y2,distance) and .png, for each image after
+            the first; matches are mutually nearest and pass the ratio test at 0.8
+A second image of a name is NAME_2. FILE: options, and medians of milliseconds ("total_ms", "stages").
+
+Exit codes: 0 done; 1 internal error; 2 bad usage, or an engine that cannot be used here; 3 bad input
+(image, output folder or file).)";
+
+constexpr int kMaxFeatures = 1000000;
+
+void add_options(CLI::App& app, CommandLine& line) {
+  static const std::map<std::string, FeatureEngine> kEngines{{"cpu", FeatureEngine::kCpu},
+                                                             {"cuda", FeatureEngine::kCuda},
+                                                             {"opencv", FeatureEngine::kOpenCv}};
+  static const std::map<std::string, bool> kSwitch{{"on", true}, {"off", false}};
+  app.add_option("IMAGE", line.images, "PNG or JPEG files; match: two or more")->required();
+  app.add_option("--engine", line.engine,
+                 "cpu (default), cuda, or opencv: OpenCV's SIFT, for comparison")
+      ->transform(CLI::CheckedTransformer(kEngines).description(""))
+      ->option_text("NAME");
+  app.add_option("--upsample", line.sift.upsample,
+                 "on (default: start with an octave at twice the resolution) or off")
+      ->transform(CLI::CheckedTransformer(kSwitch).description(""))
+      ->option_text("on|off");
+  app.add_option("--features", line.sift.max_features, "per image, at most")
+      ->capture_default_str()
+      ->check(CLI::Range(1, kMaxFeatures).description(""));
+  app.add_option("--threads", line.threads, "images at a time")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 256).description(""));
+  app.add_option("--repeat", line.repeat, "runs per image, of which the median time is told")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000).description(""));
+  app.add_option("--out", line.out, "folder for the results, made if missing")
+      ->capture_default_str();
+  app.add_option("--json", line.json, "file for the times and counts");
+}
+
+void check(const CommandLine& line) {
+  if (line.command == EvalCommand::kMatch && line.images.size() < 2) {
+    throw CLI::ValidationError("match: needs two images or more");
+  }
+  if (line.out.empty()) throw CLI::ValidationError("--out: \"\" is no name of a folder");
+  const std::string why_not = why_no_engine(line.engine);
+  if (!why_not.empty()) {
+    throw CLI::ValidationError("--engine " + to_string(line.engine) + ": " + why_not);
+  }
+}
+
+}  // namespace
+
+std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code) {
+  CommandLine line;
+  CLI::App app("Shows the features that the front end sees in images, and how they match.",
+               "feature_eval");
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  auto* const extract = app.add_subcommand("extract", "find features in each image");
+  auto* const match = app.add_subcommand("match", "match the first image with each other one");
+  for (CLI::App* const command : {extract, match}) {
+    add_options(*command, line);
+    command->footer(kFooter);
+  }
+  try {
+    app.parse(argc, argv);
+    line.command = match->parsed() ? EvalCommand::kMatch : EvalCommand::kExtract;
+    check(line);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {  // --help
+      exit_code = app.exit(error);
+    } else {
+      spdlog::error("{} (--help tells more)", error.what());
+      exit_code = kExitBadUsage;
+    }
+    return std::nullopt;
+  }
+  return line;
+}
+
+}  // namespace hybrid_slam
