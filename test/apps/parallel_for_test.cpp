@@ -1,10 +1,13 @@
 #include "apps/pipeline/parallel_for.h"
 
+#include <algorithm>
 #include <atomic>
 #include <latch>
+#include <map>
 #include <mutex>
 #include <set>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 #include <catch2/catch.hpp>
