@@ -54,7 +54,7 @@ void check(const CommandLine& line) {
     throw CLI::ValidationError("match: needs two images or more");
   }
   if (line.out.empty()) throw CLI::ValidationError("--out: \"\" is no name of a folder");
-  const std::string why_not = why_no_engine(line.engine);
+  const std::string why_not = why_no_engine(line.engine, line.sift);
   if (!why_not.empty()) {
     throw CLI::ValidationError("--engine " + to_string(line.engine) + ": " + why_not);
   }

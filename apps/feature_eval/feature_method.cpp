@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "apps/feature_eval/opencv_sift.h"
+#include "frontend/features/sift_device.h"
 
 namespace hybrid_slam {
 namespace {
@@ -60,13 +61,16 @@ std::string to_string(FeatureEngine engine) {
   return {};
 }
 
-std::string why_no_engine(FeatureEngine engine) {
-  return engine == FeatureEngine::kCuda ? "this build has no CUDA" : "";
+std::string why_no_engine(FeatureEngine engine, const SiftOptions& options) {
+  return engine == FeatureEngine::kCuda ? why_no_cuda_sift(options) : "";
 }
 
 std::unique_ptr<FeatureMethod> make_sift_method(FeatureEngine engine, const SiftOptions& options) {
-  const bool opencv = engine == FeatureEngine::kOpenCv;
-  return std::make_unique<SiftMethod>(opencv ? make_opencv_sift(options) : make_sift(options));
+  if (engine == FeatureEngine::kOpenCv) {
+    return std::make_unique<SiftMethod>(make_opencv_sift(options));
+  }
+  const auto device = engine == FeatureEngine::kCuda ? SiftDevice::kCuda : SiftDevice::kCpu;
+  return std::make_unique<SiftMethod>(make_sift_on(device, options));
 }
 
 }  // namespace hybrid_slam

@@ -36,8 +36,8 @@ enum class FeatureEngine { kCpu, kCuda, kOpenCv };
 
 std::string to_string(FeatureEngine engine);
 
-// Empty if the engine can be used here, else why not.
-std::string why_no_engine(FeatureEngine engine);
+// Empty if the engine can be used here with these options, else why not, in one line.
+std::string why_no_engine(FeatureEngine engine, const SiftOptions& options);
 
 // SIFT by one that can be used.
 std::unique_ptr<FeatureMethod> make_sift_method(FeatureEngine engine, const SiftOptions& options);

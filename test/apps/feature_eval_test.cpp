@@ -13,6 +13,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "frontend/features/sift_device.h"
 #include "test/apps/program_run.h"
 #include "test/frontend/features/test_images.h"
 #include "test/support/temp_folder.h"
@@ -240,6 +241,9 @@ TEST_CASE("feature_eval refuses with one line and a documented code what it cann
   refused({"extract", "good.png", "--threads", "0"}, 2, "--threads");
   refused({"extract", "good.png", "--repeat", "0"}, 2, "--repeat");
   refused({"extract", "good.png", "--engine", "vlfeat"}, 2, "--engine");
+  if (const std::string why = why_no_cuda_sift({}); !why.empty()) {
+    refused({"extract", "good.png", "--engine", "cuda"}, 2, "--engine cuda: " + why);
+  }
   refused({"extract", "good.png", "--upsample", "maybe"}, 2, "--upsample");
   refused({"extract", "good.png", "--out", ""}, 2, "--out");
   refused({"extract", "good.png", "none.png"}, 3, "none.png: no such image");

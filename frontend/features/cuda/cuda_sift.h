@@ -31,7 +31,8 @@ class CudaSift final : public SiftExtractor {
 
   // Times of the image last finished are there if timing was on when it was started.
   void time(CudaTiming timing);
-  CudaStageTimes stage_times() const;
+  void time_stages(bool timed) override { time(timed ? CudaTiming::kStages : CudaTiming::kOff); }
+  CudaStageTimes stage_times() const override;
 
  private:
   friend class CudaFeatures;
