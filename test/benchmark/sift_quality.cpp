@@ -8,9 +8,9 @@
 #include <memory>
 #include <string>
 
+#include "apps/feature_eval/opencv_sift.h"
 #include "frontend/features/cpu/cpu_sift.h"
 #include "test/frontend/features/sift_quality.h"
-#include "apps/feature_eval/opencv_sift.h"
 
 namespace hybrid_slam {
 namespace {

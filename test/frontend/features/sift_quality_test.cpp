@@ -5,9 +5,9 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include "apps/feature_eval/opencv_sift.h"
 #include "frontend/features/sift.h"
 #include "test/frontend/features/sift_quality.h"
-#include "apps/feature_eval/opencv_sift.h"
 
 namespace hybrid_slam {
 namespace {

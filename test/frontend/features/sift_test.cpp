@@ -11,11 +11,11 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include "apps/feature_eval/opencv_sift.h"
 #include "frontend/features/sift_device.h"
 #include "test/frontend/features/feature_agreement.h"
 #include "test/frontend/features/host_cuda_sift.h"
 #include "test/frontend/features/test_images.h"
-#include "apps/feature_eval/opencv_sift.h"
 
 namespace hybrid_slam {
 namespace {
