@@ -6,86 +6,78 @@
 #include <limits>
 #include <stdexcept>
 
-#include <Eigen/Eigenvalues>
 #include <opengv/absolute_pose/CentralAbsoluteAdapter.hpp>
 #include <opengv/absolute_pose/methods.hpp>
 
-#include "cameras/geometry/se3.h"
-#include "frontend/pose/normal_equations.h"
+#include "frontend/pose/mlpnp.h"
 #include "frontend/pose/random_sampler.h"
 
 namespace hybrid_slam {
 namespace {
 
-constexpr double kChi2 = 5.991;             // 95 %, 2 degrees of freedom
-constexpr double kMinSine = 1e-6;           // of the angles in a sample's triangle
-constexpr double kMinConditioning = 1e-12;  // smallest / largest eigenvalue of the scaled system
-constexpr int kRefinements = 5;             // inliers are chosen anew before each
-constexpr int kIterations = 10;
-constexpr double kConvergedStep = 1e-10;  // [m, rad]
+constexpr double kChi2 = 5.991;    // 95 %, 2 degrees of freedom
+constexpr double kMinSine = 1e-6;  // of the angles in a sample's triangle
+constexpr int kRefinements = 20;   // at most; inliers are chosen anew before each
 
-struct Correspondences {
-  std::span<const Eigen::Vector3d> bearings;
-  std::span<const Eigen::Vector3d> points;
-  std::span<const double> sigma;
-  int size() const { return static_cast<int>(bearings.size()); }
-};
+using Observations = std::span<const BearingObservation>;
 
-// Squared sine of the angle between bearing and point in units of its variance; infinite in the
-// opposite half space.
-double chi2(const Correspondences& data, std::size_t i, const Eigen::Matrix3d& rotation,
-            const Eigen::Vector3d& translation) {
-  const Eigen::Vector3d point = rotation * data.points[i] + translation;
-  if (!(data.bearings[i].dot(point) > 0)) return std::numeric_limits<double>::infinity();
-  const double squared_sine = data.bearings[i].cross(point).squaredNorm() / point.squaredNorm();
-  return squared_sine / (data.sigma[i] * data.sigma[i]);
+// Sum of the squared residuals at a pose, each cut off at the threshold. Where it reaches
+// `cost_limit` it is not summed to the end.
+double truncated_cost(Observations observations, const Rigid3d& cam_from_world, double cost_limit) {
+  const Eigen::Matrix3d rotation = cam_from_world.rotation().toRotationMatrix();
+  const Eigen::Vector3d translation = cam_from_world.translation();
+  double cost = 0;
+  for (const BearingObservation& o : observations) {
+    cost += std::min(bearing_chi2(o, rotation, translation), kChi2);
+    if (cost >= cost_limit) break;
+  }
+  return cost;
 }
 
 struct Consensus {
   Rigid3d cam_from_world;
+  double cost = std::numeric_limits<double>::infinity();  // truncated
   std::vector<char> inlier;
-  int inliers = 0;
-  double cost = std::numeric_limits<double>::infinity();  // sum of chi2, cut off at the threshold
+  std::vector<BearingObservation> inliers;
 };
 
-Consensus evaluate(const Correspondences& data, const Rigid3d& cam_from_world) {
-  Consensus result;
-  result.cam_from_world = cam_from_world;
-  result.inlier.assign(data.bearings.size(), 0);
-  result.cost = 0;
+Consensus consensus_at(Observations observations, const Rigid3d& cam_from_world) {
+  Consensus result{cam_from_world, 0, std::vector<char>(observations.size()), {}};
   const Eigen::Matrix3d rotation = cam_from_world.rotation().toRotationMatrix();
   const Eigen::Vector3d translation = cam_from_world.translation();
-  for (std::size_t i = 0; i < data.bearings.size(); ++i) {
-    const double s = chi2(data, i, rotation, translation);
-    const bool inlier = s <= kChi2;
-    result.inlier[i] = inlier;
-    result.inliers += inlier;
-    result.cost += inlier ? s : kChi2;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const double s = bearing_chi2(observations[i], rotation, translation);
+    result.cost += std::min(s, kChi2);
+    result.inlier[i] = s <= kChi2;
+    if (result.inlier[i]) result.inliers.push_back(observations[i]);
   }
   return result;
 }
 
 // Points or bearings on one line (through the centre, for bearings) leave the pose open.
-bool is_degenerate(const Correspondences& data, const std::array<int, 3>& sample) {
-  const auto at = [&](const auto& values, int k) {
-    return Eigen::Vector3d(values[static_cast<std::size_t>(sample[static_cast<std::size_t>(k)])]);
+bool is_degenerate(Observations observations, const std::array<int, 3>& sample) {
+  const auto at = [&](int k) -> const BearingObservation& {
+    return observations[static_cast<std::size_t>(sample[static_cast<std::size_t>(k)])];
   };
-  const Eigen::Vector3d ab = at(data.points, 1) - at(data.points, 0);
-  const Eigen::Vector3d ac = at(data.points, 2) - at(data.points, 0);
+  const Eigen::Vector3d ab = at(1).point_in_world - at(0).point_in_world;
+  const Eigen::Vector3d ac = at(2).point_in_world - at(0).point_in_world;
   const bool on_line = !(ab.cross(ac).norm() > kMinSine * ab.norm() * ac.norm());
-  const Eigen::Vector3d f0 = at(data.bearings, 0), f1 = at(data.bearings, 1),
-                        f2 = at(data.bearings, 2);
-  return on_line || !(f0.cross(f1).norm() > kMinSine) || !(f0.cross(f2).norm() > kMinSine) ||
-         !(f1.cross(f2).norm() > kMinSine);
+  return on_line || !(at(0).bearing.cross(at(1).bearing).norm() > kMinSine) ||
+         !(at(0).bearing.cross(at(2).bearing).norm() > kMinSine) ||
+         !(at(1).bearing.cross(at(2).bearing).norm() > kMinSine);
 }
 
 // OpenGV's containers live as long as its adapter.
 class MinimalSolver {
  public:
-  explicit MinimalSolver(const Correspondences& data)
-      : bearings_(data.bearings.begin(), data.bearings.end()),
-        points_(data.points.begin(), data.points.end()),
-        adapter_(bearings_, points_) {}
+  explicit MinimalSolver(Observations observations) : adapter_(bearings_, points_) {
+    bearings_.reserve(observations.size());
+    points_.reserve(observations.size());
+    for (const BearingObservation& o : observations) {
+      bearings_.push_back(o.bearing);
+      points_.push_back(o.point_in_world);
+    }
+  }
 
   // At most four poses that are finite.
   std::vector<Rigid3d> solve(const std::array<int, 3>& sample) const {
@@ -107,84 +99,21 @@ class MinimalSolver {
 };
 
 // Iterations after which a sample of three inliers has been drawn with the wanted confidence.
-int needed_iterations(double inlier_share, double confidence, int max_iterations) {
+int needed_iterations(double inlier_share, const PnpRansacOptions& options) {
   const double good_sample = std::pow(inlier_share, 3);
   if (good_sample >= 1) return 1;
-  const double needed = std::log(1 - confidence) / std::log1p(-good_sample);
-  return needed < max_iterations ? static_cast<int>(std::ceil(needed)) : max_iterations;
+  const double needed = std::log(1 - options.confidence) / std::log1p(-good_sample);
+  return needed < options.max_iterations ? static_cast<int>(std::ceil(needed))
+                                         : options.max_iterations;
 }
 
-std::optional<Consensus> search(const Correspondences& data, const PnpRansacOptions& options) {
-  const MinimalSolver solver(data);
-  RandomSampler sampler(options.seed);
-  Consensus best;
-  int iterations = options.max_iterations;
-  for (int i = 0; i < iterations; ++i) {
-    const std::array<int, 3> sample = sampler.three_of(data.size());
-    if (is_degenerate(data, sample)) continue;
-    for (const Rigid3d& pose : solver.solve(sample)) {
-      Consensus candidate = evaluate(data, pose);
-      if (candidate.cost >= best.cost) continue;
-      best = std::move(candidate);
-      iterations = needed_iterations(static_cast<double>(best.inliers) / data.size(),
-                                     options.confidence, options.max_iterations);
-    }
-  }
-  if (best.inliers < 3) return std::nullopt;
-  return best;
-}
-
-// The residual of a bearing lies in the plane tangent to the sphere at the bearing that was
-// measured: two coordinates [rad] along an orthonormal basis of that plane.
-PoseNormalEquations linearize(const Correspondences& data, const Consensus& at) {
-  PoseNormalEquations equations;
-  const Eigen::Matrix3d rotation = at.cam_from_world.rotation().toRotationMatrix();
-  for (std::size_t i = 0; i < data.bearings.size(); ++i) {
-    if (!at.inlier[i]) continue;
-    const Eigen::Vector3d point = rotation * data.points[i] + at.cam_from_world.translation();
-    const double distance = point.norm();
-    const Eigen::Vector3d direction = point / distance;
-    Eigen::Matrix<double, 2, 3, Eigen::RowMajor> basis;
-    basis.row(0) = data.bearings[i].unitOrthogonal();
-    basis.row(1) = data.bearings[i].cross(Eigen::Vector3d(basis.row(0)));
-    const Eigen::Vector2d residual = basis * direction;
-    const Eigen::Matrix<double, 2, 3, Eigen::RowMajor> d_point =
-        (basis - residual * direction.transpose()) / distance;
-    equations.add<2>(pose_jacobian<2>(d_point, point), residual,
-                     1 / (data.sigma[i] * data.sigma[i]));
-  }
-  return equations;
-}
-
-// Whether the inliers determine all six unknowns, whatever the units of each.
-bool is_determined(const Matrix6d& lower_information) {
-  Matrix6d scaled = lower_information.selfadjointView<Eigen::Lower>();
-  if (!(scaled.diagonal().minCoeff() > 0)) return false;
-  const Vector6d scale = scaled.diagonal().cwiseSqrt().cwiseInverse();
-  scaled = scale.asDiagonal() * scaled * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues()[0] > kMinConditioning * eigen.eigenvalues()[5];
-}
-
-// Gauss-Newton on the inliers of `at`, which stay as they are.
-std::optional<Rigid3d> minimize(const Correspondences& data, Consensus at) {
-  for (int i = 0; i < kIterations; ++i) {
-    const PoseNormalEquations equations = linearize(data, at);
-    if (!is_determined(equations.information)) return std::nullopt;
-    const std::optional<Vector6d> step = equations.solve(0);
-    if (!step) return std::nullopt;
-    at.cam_from_world = se3_exp(*step) * at.cam_from_world;
-    if (step->norm() < kConvergedStep) break;
-  }
-  return at.cam_from_world;
-}
-
-// None if the inliers leave the pose open.
-std::optional<Consensus> refine(const Correspondences& data, Consensus best) {
+// MLPnP on the inliers, which are chosen anew, as long as that lowers the cost. None if they leave
+// the pose open.
+std::optional<Consensus> refine(Observations observations, Consensus best) {
   for (int i = 0; i < kRefinements; ++i) {
-    const std::optional<Rigid3d> pose = minimize(data, best);
+    const std::optional<Rigid3d> pose = solve_mlpnp(best.inliers, &best.cam_from_world);
     if (!pose) return std::nullopt;
-    Consensus refined = evaluate(data, *pose);
+    Consensus refined = consensus_at(observations, *pose);
     if (refined.cost > best.cost) break;
     const bool same = refined.inlier == best.inlier;
     best = std::move(refined);
@@ -193,28 +122,53 @@ std::optional<Consensus> refine(const Correspondences& data, Consensus best) {
   return best;
 }
 
-void check(const Correspondences& data, const PnpRansacOptions& options) {
-  if (data.points.size() != data.bearings.size() || data.sigma.size() != data.bearings.size()) {
-    throw std::invalid_argument("solve_pnp_ransac: unequal numbers of bearings, points and sigmas");
+// Each sample that is better than all samples before is refined; the best outcome counts.
+Consensus search(Observations observations, const PnpRansacOptions& options) {
+  const MinimalSolver solver(observations);
+  const int count = static_cast<int>(observations.size());
+  RandomSampler sampler(options.seed);
+  Consensus best;
+  double best_sample = std::numeric_limits<double>::infinity();
+  int iterations = options.max_iterations;
+  for (int i = 0; i < iterations; ++i) {
+    const std::array<int, 3> sample = sampler.three_of(count);
+    if (is_degenerate(observations, sample)) continue;
+    for (const Rigid3d& pose : solver.solve(sample)) {
+      const double cost = truncated_cost(observations, pose, best_sample);
+      if (cost >= best_sample) continue;
+      best_sample = cost;
+      std::optional<Consensus> refined = refine(observations, consensus_at(observations, pose));
+      if (!refined || refined->cost >= best.cost) continue;
+      best = std::move(*refined);
+      const double inliers = static_cast<double>(best.inliers.size());
+      iterations = needed_iterations(inliers / count, options);
+    }
   }
-  if (!(options.confidence > 0 && options.confidence < 1) || options.max_iterations < 1) {
-    throw std::invalid_argument("solve_pnp_ransac: confidence or max_iterations out of range");
-  }
+  return best;
 }
 
 }  // namespace
 
-std::optional<PnpResult> solve_pnp_ransac(std::span<const Eigen::Vector3d> bearings,
-                                          std::span<const Eigen::Vector3d> points_in_world,
-                                          std::span<const double> angular_sigma,
+std::optional<PnpResult> solve_pnp_ransac(std::span<const BearingObservation> observations,
                                           const PnpRansacOptions& options) {
-  const Correspondences data{bearings, points_in_world, angular_sigma};
-  check(data, options);
-  if (data.size() < std::max(3, options.min_inliers)) return std::nullopt;
-  std::optional<Consensus> best = search(data, options);
-  if (best) best = refine(data, std::move(*best));
-  if (!best || best->inliers < options.min_inliers) return std::nullopt;
-  return PnpResult{best->cam_from_world, std::move(best->inlier), best->inliers};
+  if (!(options.confidence > 0 && options.confidence < 1) || options.max_iterations < 1) {
+    throw std::invalid_argument("solve_pnp_ransac: confidence or max_iterations out of range");
+  }
+  std::vector<BearingObservation> usable;
+  std::vector<std::size_t> index;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (!observations[i].is_usable()) continue;
+    usable.push_back(observations[i]);
+    index.push_back(i);
+  }
+  const std::size_t needed = static_cast<std::size_t>(std::max(3, options.min_inliers));
+  if (usable.size() < needed) return std::nullopt;
+  const Consensus best = search(usable, options);
+  if (best.inliers.size() < needed) return std::nullopt;
+  PnpResult result{best.cam_from_world, std::vector<char>(observations.size()),
+                   static_cast<int>(best.inliers.size())};
+  for (std::size_t i = 0; i < index.size(); ++i) result.inlier[index[i]] = best.inlier[i];
+  return result;
 }
 
 }  // namespace hybrid_slam

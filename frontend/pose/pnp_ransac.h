@@ -5,9 +5,8 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "cameras/geometry/rigid3d.h"
+#include "frontend/pose/bearing_observation.h"
 
 namespace hybrid_slam {
 
@@ -20,17 +19,15 @@ struct PnpRansacOptions {
 
 struct PnpResult {
   Rigid3d cam_from_world;
-  std::vector<char> inlier;  // one per correspondence
+  std::vector<char> inlier;  // one per observation
   int inliers = 0;
 };
 
-// Pose from bearings (unit vectors in the camera) and points in the world, by minimal solvers
-// inside RANSAC; works for every camera model, rays beyond 90 degrees included. angular_sigma[i] is
-// the standard deviation of bearing i [rad]; an inlier lies within chi2 5.991 of it. None if no
-// pose has min_inliers. Same seed, same result.
-std::optional<PnpResult> solve_pnp_ransac(std::span<const Eigen::Vector3d> bearings,
-                                          std::span<const Eigen::Vector3d> points_in_world,
-                                          std::span<const double> angular_sigma,
+// Pose from observations of which many may be wrong, without a prediction: minimal solvers inside
+// RANSAC, then MLPnP on the inliers, which are chosen anew. An inlier's bearing_chi2 is at most
+// 5.991; what is not usable is none. None if no pose has min_inliers or if the inliers leave it
+// open. Same seed, same result.
+std::optional<PnpResult> solve_pnp_ransac(std::span<const BearingObservation> observations,
                                           const PnpRansacOptions& options);
 
 }  // namespace hybrid_slam

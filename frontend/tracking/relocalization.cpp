@@ -8,31 +8,6 @@
 namespace hybrid_slam {
 namespace {
 
-struct Correspondences {
-  std::vector<std::size_t> keypoint;
-  std::vector<Eigen::Vector3d> bearings;
-  std::vector<Eigen::Vector3d> points_in_world;
-  std::vector<double> angular_sigma;
-};
-
-Correspondences make_correspondences(const MapSnapshot& map, const FeatureView& view,
-                                     const std::vector<LandmarkId>& landmarks) {
-  Correspondences result;
-  const double focal = focal_length(view.camera);
-  for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    const Landmark* landmark = landmarks[i].valid() ? map.find(landmarks[i]) : nullptr;
-    const Keypoint& keypoint = view.features.keypoints[i];
-    const auto bearing = unproject(view.camera, Eigen::Vector2d(keypoint.x, keypoint.y));
-    if (landmark != nullptr && bearing) {
-      result.keypoint.push_back(i);
-      result.bearings.push_back(*bearing);
-      result.points_in_world.push_back(landmark->point_in_world);
-      result.angular_sigma.push_back(keypoint.sigma / focal);
-    }
-  }
-  return result;
-}
-
 // Optimises the pose and drops the landmarks that do not agree with it.
 int refine_and_prune(const MapSnapshot& map, const FeatureView& view,
                      const PoseRefinementOptions& options, RelocalizedFrame& frame) {
@@ -92,19 +67,20 @@ std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const Featu
                                              const RelocalizationOptions& options) {
   const auto matched =
       match_keyframe(map, id, view.features, options.ratio, options.max_descriptor_distance);
-  const Correspondences pairs = make_correspondences(map, view, matched);
-  if (pairs.keypoint.size() < static_cast<std::size_t>(options.min_matches)) {
+  std::vector<std::size_t> keypoint;
+  const auto observations = pose_observations(map, view.features, view.u_right, matched, keypoint);
+  if (observations.size() < static_cast<std::size_t>(options.min_matches)) {
     return std::nullopt;
   }
   const auto pnp =
-      solve_pnp_ransac(pairs.bearings, pairs.points_in_world, pairs.angular_sigma, options.ransac);
+      solve_pnp_ransac(bearing_observations(view.camera, observations), options.ransac);
   if (!pnp) {
     return std::nullopt;
   }
   RelocalizedFrame frame{pnp->cam_from_world, id, std::vector<LandmarkId>(view.features.size()), 0};
-  for (std::size_t i = 0; i < pairs.keypoint.size(); ++i) {
+  for (std::size_t i = 0; i < keypoint.size(); ++i) {
     if (pnp->inlier[i]) {
-      frame.landmarks[pairs.keypoint[i]] = matched[pairs.keypoint[i]];
+      frame.landmarks[keypoint[i]] = matched[keypoint[i]];
     }
   }
   if (refine_and_prune(map, view, pose, frame) < options.ransac.min_inliers) {
