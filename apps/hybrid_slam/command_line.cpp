@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
-#include "apps/pipeline/slam_run.h"
+#include "apps/pipeline/parallel_for.h"
 
 namespace hybrid_slam {
 namespace {

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -8,7 +9,7 @@
 
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/hybrid_slam/outputs.h"
-#include "apps/hybrid_slam/progress.h"
+#include "apps/io/progress_line.h"
 #include "backend/problem/solver_log.h"
 #include "cameras/input_error.h"
 #include "cameras/output_file.h"
@@ -55,9 +56,13 @@ int run(const CommandLine& line) {
     spdlog::info("{} ({}): {} stereo frames of {}x{}{}", info.name, info.layout, sequence->size(),
                  info.stereo.width, info.stereo.height, info.fisheye ? ", with a fisheye" : "");
   }
-  ProgressPrinter progress(line.quiet);
+  ProgressLine progress("frames", line.quiet);
   RunHooks hooks;
-  hooks.progress = [&](const RunProgress& state) { progress(state); };
+  hooks.progress = [&](const RunProgress& state) {
+    progress.update(state.done, state.total,
+                    fmt::format("lost {}  keyframes {}  landmarks {}", state.frames.lost,
+                                state.keyframes, state.landmarks));
+  };
   hooks.warning = [&](const std::string& text) {
     progress.finish();
     spdlog::warn(text);

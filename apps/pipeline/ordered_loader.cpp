@@ -3,14 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "apps/pipeline/slam_run.h"
 #include "cameras/input_error.h"
 
 namespace hybrid_slam {
-
-int default_thread_count() {
-  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-}
 
 OrderedLoader::OrderedLoader(const FrameSource& source, int threads, NextIndex next_index)
     : source_(source),

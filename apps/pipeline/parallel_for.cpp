@@ -43,6 +43,10 @@ class WorkList {
 
 }  // namespace
 
+int default_thread_count() {
+  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
+
 void parallel_for(std::size_t count, int threads,
                   const std::function<void(std::size_t i, std::size_t worker)>& work) {
   WorkList list(count);

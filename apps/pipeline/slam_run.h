@@ -88,9 +88,6 @@ struct RunResult {
   Rigid3d cam_from_world(const FrameRecord& record) const;
 };
 
-// One per core.
-int default_thread_count();
-
 // Every frame is tracked and mapped before the next one. Same input, options and seed give the same
 // result, bit for bit.
 RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
