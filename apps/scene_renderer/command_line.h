@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "apps/scene_renderer/dataset_writer.h"
+
+namespace hybrid_slam {
+
+// What the user asked for.
+struct CommandLine {
+  std::string out;
+  std::string sequence;
+  ImageFormat format = ImageFormat::kJpeg;
+  SceneOptions options;
+  int width = 1024;  // [px] of the stereo images
+  int height = 768;
+  int threads = 0;  // 0: one per core
+  bool quiet = false;
+};
+
+// Exit codes of the program, as --help lists them.
+enum ExitCode : int {
+  kExitOk = 0,
+  kExitInternalError = 1,
+  kExitBadUsage = 2,
+  kExitBadInput = 3,
+  kExitInterrupted = 130
+};
+
+// Reads the command line. Empty if the program shall end at once with `exit_code` (help, or bad
+// usage, which has been reported).
+std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code);
+
+}  // namespace hybrid_slam

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+
+#include "apps/scene_renderer/mesh.h"
+
+namespace hybrid_slam {
+
+struct ReliefOptions {
+  float half_size = 9;         // [m] of the square of ground, its middle at the origin
+  float detailed_size = 2;     // [m] half size of the part in the middle with the finest triangles
+  int grid = 640;              // vertices along a side
+  float mound_height = 0.22F;  // [m] of the mound in the middle
+  float roughness = 0.2F;      // [m] height of the ground's longest waves
+  int boulders = 480;
+  float smallest_boulder = 0.03F;  // [m] radius
+  float largest_boulder = 0.38F;   // [m]
+  float boulder_area = 2.6F;       // [m] radius of the area that they lie in
+};
+
+// A seafloor about z = 0, z up: relief of many octaves with overhanging places, and boulders
+// (rounded, craggy, slabs) set into it. Depends on options and seed alone.
+TriangleMesh make_seafloor(const ReliefOptions& options, std::uint32_t seed, int threads);
+
+}  // namespace hybrid_slam

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "apps/scene_renderer/ray_caster.h"
+#include "apps/scene_renderer/scene_options.h"
+#include "cameras/geometry/rigid3d.h"
+
+namespace hybrid_slam {
+
+// Where the cameras are at one moment, and what the hard preset does to the fisheye.
+struct RigMoment {
+  double time = 0;  // [s]
+  Rigid3d world_from_left;
+  std::optional<Rigid3d> world_from_fish;  // hybrid sequences only
+  float silt = 0;                          // 0 to 1: strength of the cloud about the fisheye
+  bool turned_away = false;                // the wrist looks away from the ground
+};
+
+// How far from the origin the motion's cameras look at the ground [m].
+double survey_radius(const SceneOptions& options);
+
+// Hybrid: the vehicle hovers about 1.9 m from the scene's middle and sways; the wrist sweeps
+// between 0.4 and 1.5 m ahead of it and looks at what the stereo pair sees, from all its sides, at
+// least 0.3 m above the ground. Survey: a spiral at 1.5 m, then arms across it, at 0.055 m per
+// frame.
+std::vector<RigMoment> make_motion(const SceneOptions& options, const RayCaster& seafloor);
+
+}  // namespace hybrid_slam

@@ -1,0 +1,71 @@
+#include "apps/scene_renderer/scene_options.h"
+
+namespace hybrid_slam {
+namespace {
+
+// Clear water, nothing in it.
+void make_easy(SceneOptions& options) {
+  options.water.attenuation = {0.2F, 0.08F, 0.06F};
+  options.water.scattering = {0.012F, 0.014F, 0.015F};
+  options.snow.density = 0;
+  options.film.noise = 0.8F;
+  options.film.blur = 0.45F;
+  options.sway = 0.6;
+}
+
+void make_hard(SceneOptions& options) {
+  options.water.attenuation = {0.52F, 0.33F, 0.3F};
+  options.water.scattering = {0.08F, 0.095F, 0.1F};
+  options.snow.density = 900;
+  options.snow.largest_radius = 0.0014F;
+  options.film.noise = 2.6F;
+  options.film.blur = 0.75F;
+  options.fish = 7;
+  options.sway = 1.6;
+  options.silt_episodes = options.kind == SceneKind::kHybrid;
+  options.turned_away = options.kind == SceneKind::kHybrid;
+}
+
+}  // namespace
+
+const std::map<std::string, SceneKind>& scene_kinds() {
+  static const std::map<std::string, SceneKind> kinds{{"hybrid", SceneKind::kHybrid},
+                                                      {"survey", SceneKind::kSurvey}};
+  return kinds;
+}
+
+const std::map<std::string, Difficulty>& difficulties() {
+  static const std::map<std::string, Difficulty> names{
+      {"easy", Difficulty::kEasy}, {"normal", Difficulty::kNormal}, {"hard", Difficulty::kHard}};
+  return names;
+}
+
+SceneOptions make_scene_options(SceneKind kind, Difficulty difficulty, std::uint32_t seed) {
+  SceneOptions options;
+  options.kind = kind;
+  options.difficulty = difficulty;
+  options.seed = seed;
+  options.frames = kind == SceneKind::kHybrid ? 120 : 400;
+  options.rate = kind == SceneKind::kHybrid ? 3 : 5;
+  if (difficulty == Difficulty::kEasy) make_easy(options);
+  if (difficulty == Difficulty::kHard) make_hard(options);
+  return options;
+}
+
+SceneCameras make_scene_cameras(int stereo_width, int stereo_height) {
+  const double scale = stereo_width / 1024.0;
+  const double middle = 0.5 * (stereo_width - 1);
+  SceneCameras cameras;
+  const double focal = 858.35 * scale;
+  cameras.stereo = {
+      {focal, focal, middle - 4.3 * scale, 0.5 * (stereo_height - 1) + 6.2 * scale, 0.15},
+      stereo_width,
+      stereo_height};
+  cameras.fisheye = {{318.52 * scale, 318.21 * scale, middle + 3.4 * scale, middle - 2.9 * scale,
+                      0.0123, -0.0212, 0.0134, -0.0036},
+                     stereo_width,
+                     stereo_width};
+  return cameras;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,126 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "cameras/calibration_file.h"
+#include "frontend/input/image_sequence.h"
+#include "test/support/child_process.h"
+#include "test/support/temp_folder.h"
+
+namespace hybrid_slam {
+namespace {
+
+namespace fs = std::filesystem;
+
+Outcome render(const fs::path& folder, const std::vector<std::string>& arguments) {
+  return run_program(SCENE_RENDERER, arguments, folder);
+}
+
+std::vector<std::string> small(const std::string& out, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments{out, "--quiet", "--resolution", "96x72", "--frames", "3"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+// Every file below a folder, with its content.
+std::map<std::string, std::string> content_of(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) {
+      files[fs::relative(entry.path(), folder).string()] = read_text(entry.path());
+    }
+  }
+  return files;
+}
+
+void check_refused(const Outcome& outcome, int code, const std::string& reason) {
+  INFO("stderr: " << outcome.err);
+  CHECK(outcome.code == code);
+  CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
+  CHECK(outcome.err.find("scene_renderer: error: ") == 0);
+  CHECK(outcome.err.find(reason) != std::string::npos);
+}
+
+TEST_CASE("the readers read a hybrid sequence, and the same options make the same bytes") {
+  const TempFolder folder;
+  REQUIRE(render(folder.path(), small("a", {"--threads", "1"})).code == 0);
+  REQUIRE(render(folder.path(), small("b", {"--threads", "3"})).code == 0);
+  const auto files = content_of(folder.path() / "a");
+  CHECK(files.size() == 3 * 3 + 3 + 5);
+  CHECK(files == content_of(folder.path() / "b"));
+
+  const auto sequence =
+      open_sequence((folder.path() / "a").string(), SequenceLayout::kAuto, "hybrid");
+  const SequenceInfo& info = sequence->info();
+  CHECK(info.layout == "uwslam");
+  for (const std::string& warning : info.warnings) UNSCOPED_INFO(warning);
+  CHECK(info.warnings.empty());
+  CHECK(info.truth_convention == "world_from_cam");
+  REQUIRE(info.truth.size() == 3);
+  REQUIRE(sequence->size() == 3);
+  CHECK(info.times[2] == Approx(2.0 / 3).margin(1e-6));
+  CHECK(info.stereo.width == 96);
+  CHECK(info.stereo.params[4] == Approx(0.15));
+  CHECK(sequence->read(2).right.height == 72);
+  const auto fisheye = read_fisheye((folder.path() / "a/hybrid/calibration/fisheye_calib.yaml"));
+  CHECK(fisheye.width == 96);
+  CHECK(fisheye.height == 96);
+  const auto scene = nlohmann::json::parse(files.at("hybrid/hybrid/scene.json"));
+  CHECK(scene["frames"] == 3);
+  CHECK(scene["fisheye"]["common_view"].size() == 3);
+}
+
+TEST_CASE("the readers read a survey") {
+  const TempFolder folder;
+  REQUIRE(render(folder.path(), small("a", {"--kind", "survey", "--format", "png"})).code == 0);
+  const auto sequence = open_sequence((folder.path() / "a").string(), SequenceLayout::kAuto, "");
+  CHECK(sequence->info().name == "stereo");
+  CHECK(sequence->info().warnings.empty());
+  CHECK(sequence->info().truth.size() == 3);
+  CHECK(sequence->info().times[2] == Approx(0.4).margin(1e-6));
+  CHECK(sequence->read(0).left.width == 96);
+}
+
+TEST_CASE("sequences share a folder if their cameras agree, and none is overwritten") {
+  const TempFolder folder;
+  const auto frame = [](const std::string& name, const std::string& size) {
+    return std::vector<std::string>{"a",  "--quiet",    "--frames", "1", "--resolution",
+                                    size, "--sequence", name};
+  };
+  REQUIRE(render(folder.path(), frame("one", "96x72")).code == 0);
+  const auto before = content_of(folder.path() / "a");
+  check_refused(render(folder.path(), frame("one", "96x72")), 3, "a/hybrid/one: is there already");
+  check_refused(render(folder.path(), frame("two", "128x96")), 3,
+                "left_camera.yaml: sequences beside this one have other cameras");
+  CHECK(content_of(folder.path() / "a") == before);
+  CHECK(render(folder.path(), frame("two", "96x72")).code == 0);
+}
+
+TEST_CASE("bad command lines and folders end in one line") {
+  const TempFolder folder;
+  write_text(folder.path() / "file", "x");
+  const auto refused = [&](const std::vector<std::string>& arguments, int code,
+                           const std::string& reason) {
+    check_refused(render(folder.path(), arguments), code, reason);
+  };
+  refused({}, 2, "OUT is required");
+  refused({""}, 2, "OUT");
+  refused({"a", "--kind", "lunar"}, 2, "--kind");
+  refused({"a", "--preset", "impossible"}, 2, "--preset");
+  refused({"a", "--frames", "0"}, 2, "--frames");
+  refused({"a", "--frames", "nan"}, 2, "--frames");
+  refused({"a", "--seed", "-1"}, 2, "--seed");
+  refused({"a", "--threads", "0"}, 2, "--threads");
+  refused({"a", "--sequence", "../b"}, 2, "\"../b\" is no name of a sequence");
+  refused({"a", "--unknown"}, 2, "--unknown");
+  for (const char* const size :
+       {"640", "640x", "x480", "640x480x3", "0x480", "-640x480", "1e3x480", "640x99999999999"}) {
+    refused({"a", "--resolution", size}, 2, "is no size like 1024x768");
+  }
+  refused({"file/a", "--quiet"}, 3, "cannot be made");
+  CHECK_FALSE(fs::exists(folder.path() / "a"));
+}
+
+}  // namespace
+}  // namespace hybrid_slam
