@@ -33,7 +33,8 @@ Trajectory read_estimate(const fs::path& path) {
   return std::move(file.poses);
 }
 
-void print(const char* name, const ErrorStatistics& errors, double unit, const char* unit_name) {
+void print_errors(const char* name, const ErrorStatistics& errors, double unit,
+                  const char* unit_name) {
   fmt::print("{:<12} mean {:.4f}  median {:.4f}  rmse {:.4f}  max {:.4f}  [{}] ({} values)\n", name,
              unit * errors.mean, unit * errors.median, unit * errors.rmse, unit * errors.max,
              unit_name, errors.count);
@@ -61,8 +62,8 @@ void evaluate_hybrid(const std::string& estimate, const std::string& truth,
     return;
   }
   fmt::print("{:<12} {}\n", "convention", poses.convention);
-  print("translation", error->translation, 100, "cm");
-  print("rotation", error->rotation, 180 / std::numbers::pi, "deg");
+  print_errors("translation", error->translation, 100, "cm");
+  print_errors("rotation", error->rotation, 180 / std::numbers::pi, "deg");
   const double share = static_cast<double>(error->registered) / static_cast<double>(error->total);
   fmt::print("{:<12} {} of {} fisheye frames ({:.1f} %)\n", "registered", error->registered,
              error->total, 100 * share);

@@ -12,11 +12,11 @@
 namespace hybrid_slam {
 namespace {
 
-constexpr int kSize = 400;
+constexpr int kFisheyeSize = 400;
 
 // 100 px per radian, to begin with.
 Calibrated<KannalaBrandt> camera(double k1 = 0) {
-  return {{100, 100, 205, 195, k1, 0, 0, 0}, kSize, kSize};
+  return {{100, 100, 205, 195, k1, 0, 0, 0}, kFisheyeSize, kFisheyeSize};
 }
 
 double radius(int x, int y) { return std::hypot(x - 205.0, y - 195.0); }
@@ -24,9 +24,10 @@ double radius(int x, int y) { return std::hypot(x - 205.0, y - 195.0); }
 // Bright within a circle, dark and noisy outside.
 GrayImage circle_image(double circle, int bright, int dark = 5) {
   std::mt19937 random(1);
-  GrayImage image{kSize, kSize, std::vector<std::uint8_t>(kSize * kSize)};
-  for (int y = 0; y < kSize; ++y) {
-    for (int x = 0; x < kSize; ++x) {
+  GrayImage image{kFisheyeSize, kFisheyeSize,
+                  std::vector<std::uint8_t>(kFisheyeSize * kFisheyeSize)};
+  for (int y = 0; y < kFisheyeSize; ++y) {
+    for (int x = 0; x < kFisheyeSize; ++x) {
       const int noise = static_cast<int>(random() % 7) - 3;
       const int level = radius(x, y) <= circle ? bright + 10 * ((x / 8 + y / 8) % 3) : dark;
       image.row(y)[x] = static_cast<std::uint8_t>(std::clamp(level + noise, 0, 255));
@@ -61,7 +62,8 @@ TEST_CASE("the image circle is found where there is one") {
   CHECK(!find_image_circle(camera(), circle_image(1000, 40)));  // reaches to the corners
   CHECK(!find_image_circle(camera(), circle_image(150, -5)));   // as dark inside
   CHECK(!find_image_circle(camera(),
-                           GrayImage{kSize, kSize, std::vector<std::uint8_t>(kSize * kSize)}));
+                           GrayImage{kFisheyeSize, kFisheyeSize,
+                                     std::vector<std::uint8_t>(kFisheyeSize * kFisheyeSize)}));
 }
 
 TEST_CASE("the mask is the circle of most examples, less the border") {
@@ -86,7 +88,7 @@ TEST_CASE("a given angle goes before what is found") {
 
 TEST_CASE("a user's mask takes parts out, and must have the image's size") {
   const TempFolder folder;
-  cv::Mat picture(kSize, kSize, CV_8UC1, cv::Scalar(255));
+  cv::Mat picture(kFisheyeSize, kFisheyeSize, CV_8UC1, cv::Scalar(255));
   picture(cv::Rect(180, 160, 30, 40)) = 0;
   write_picture(folder.path() / "mask.png", picture);
   FisheyeViewOptions options;

@@ -13,8 +13,8 @@ namespace {
 
 // A hovering pair, a wrist that swings, and a map made of every fourth moment of the pair alone, or
 // of both cameras.
-struct World {
-  explicit World(bool fisheye_in_map) {
+struct FisheyeWorld {
+  explicit FisheyeWorld(bool fisheye_in_map) {
     SyntheticSceneOptions options;
     options.trajectory = SceneTrajectory::kHover;
     options.times = 40;
@@ -40,7 +40,7 @@ struct World {
   FilledMap filled;
 };
 
-void check_pose(const Rigid3d& estimate, const Rigid3d& truth) {
+void check_fisheye_pose(const Rigid3d& estimate, const Rigid3d& truth) {
   CHECK(pose_scene::translation_error(estimate, truth) < 0.003);
   CHECK(pose_scene::rotation_error(estimate, truth) < 0.002);
 }
@@ -49,32 +49,32 @@ void check_pose(const Rigid3d& estimate, const Rigid3d& truth) {
 
 TEST_CASE("A swinging fisheye is placed in a map, whichever camera made it") {
   for (const bool fisheye_in_map : {false, true}) {
-    const World world(fisheye_in_map);
+    const FisheyeWorld world(fisheye_in_map);
     FisheyeTracker tracker = world.tracker();
     for (std::size_t moment = 9; moment < 16; ++moment) {
       const TrackedFrame tracked = tracker.track(world.frame(moment), world.map(), KeyframeId());
       CHECK(tracked.source == (moment == 9 ? PoseSource::kRelocalization : PoseSource::kLocalMap));
       CHECK(tracked.inliers > 100);
-      check_pose(tracked.cam_from_world, world.truth(moment).cam_from_world);
-      check_pose(tracked.cam_from_reference * world.map().cam_from_world(tracked.reference),
-                 tracked.cam_from_world);
+      check_fisheye_pose(tracked.cam_from_world, world.truth(moment).cam_from_world);
+      check_fisheye_pose(tracked.cam_from_reference * world.map().cam_from_world(tracked.reference),
+                         tracked.cam_from_world);
     }
   }
 }
 
 TEST_CASE("The fisheye looks where the stereo pair is, when only that is known") {
-  const World world(false);
+  const FisheyeWorld world(false);
   FisheyeTrackerOptions options;
   options.relocalization.max_keyframes = 0;
   const KeyframeId reference = world.filled.keyframes[1];
   CHECK(!world.tracker(options).track(world.frame(9), world.map(), KeyframeId()).tracked());
   const TrackedFrame tracked = world.tracker(options).track(world.frame(9), world.map(), reference);
   CHECK(tracked.tracked());
-  check_pose(tracked.cam_from_world, world.truth(9).cam_from_world);
+  check_fisheye_pose(tracked.cam_from_world, world.truth(9).cam_from_world);
 }
 
 TEST_CASE("A blind fisheye is lost, and so is one elsewhere") {
-  const World world(false);
+  const FisheyeWorld world(false);
   FisheyeTracker tracker = world.tracker();
   REQUIRE(tracker.track(world.frame(9), world.map(), KeyframeId()).tracked());
   FeatureSet none;
@@ -94,7 +94,7 @@ TEST_CASE("A blind fisheye is lost, and so is one elsewhere") {
 }
 
 TEST_CASE("A fisheye keyframe is what was seen, without new points") {
-  const World world(false);
+  const FisheyeWorld world(false);
   FisheyeTrackerOptions options;
   options.keyframes.max_frames_between = 1;
   options.keyframes.min_motion = 0;
@@ -119,7 +119,7 @@ TEST_CASE("FisheyeTrackerOptions out of range are refused") {
   FisheyeTrackerOptions options;
   CHECK(options.validate().empty());
   options.local_map_radius = -1;
-  const World world(false);
+  const FisheyeWorld world(false);
   CHECK_THROWS_AS(world.tracker(options), std::invalid_argument);
 }
 
