@@ -26,7 +26,8 @@ enum class DescriptorKind : std::uint8_t {
   kNone = 0,
   kRootSiftOpenCv = 1,  // by OpenCV's SIFT
   kSynthetic = 2,
-  kRootSift = 3,  // by ours: frontend/features/definition
+  kRootSift = 3,   // by ours: frontend/features/definition
+  kPlainSift = 4,  // L2-normalised, of other programs; in bytes times 512. In vocabularies only
 };
 
 // keypoints[i] and descriptors[i] belong together.
