@@ -30,7 +30,8 @@ class TreeBuilder {
   std::shared_ptr<Tree> build() {
     tree_->bytes.push_back({});
     for (int level = 0; level < options_.levels && !level_.empty(); ++level) {
-      stage_ = "level " + std::to_string(level + 1) + " of " + std::to_string(options_.levels);
+      unit_ = "nodes split at level " + std::to_string(level) + " of " +
+              std::to_string(options_.levels);
       append(split_level());
     }
     // The last level has no children.
@@ -56,19 +57,20 @@ class TreeBuilder {
     std::vector<std::size_t> small;
     for (std::size_t i = 0; i < level_.size(); ++i) {
       if (level_[i].size() > kLarge) {
-        progress_(stage_, static_cast<double>(i) / static_cast<double>(level_.size()));
+        progress_(unit_, i - small.size(), level_.size());
         clusters[i] = split(i, parallel_);
       } else {
         small.push_back(i);
       }
     }
+    const std::size_t large = level_.size() - small.size();
     for (std::size_t begin = 0; begin < small.size(); begin += kNodesAtOnce) {
+      progress_(unit_, large + begin, level_.size());
       parallel_(std::min(kNodesAtOnce, small.size() - begin), [&](std::size_t i) {
         clusters[small[begin + i]] = split(small[begin + i], serial_for);
       });
-      progress_(stage_, std::min(1.0, static_cast<double>(begin + kNodesAtOnce) /
-                                          static_cast<double>(small.size())));
     }
+    progress_(unit_, level_.size(), level_.size());
     return clusters;
   }
 
@@ -95,7 +97,7 @@ class TreeBuilder {
   const ParallelFor& parallel_;
   const TrainingProgress& progress_;
   std::vector<std::span<Descriptor>> level_;  // what is below each node of the last level
-  std::string stage_;
+  std::string unit_;
   std::shared_ptr<Tree> tree_ = std::make_shared<Tree>();
 };
 
@@ -128,8 +130,7 @@ std::vector<std::uint32_t> image_counts(const Vocabulary& vocabulary,
     for (const std::vector<NodeId>& image : words) {
       for (const NodeId word : image) ++counts[word];
     }
-    progress("weights",
-             static_cast<double>(begin + words.size()) / static_cast<double>(image_ends.size()));
+    progress("images weighed", begin + words.size(), image_ends.size());
   }
   return counts;
 }

@@ -21,8 +21,9 @@ struct VocabularyTrainingOptions {
   std::string validate() const;
 };
 
-// Called now and then with what is being done, and how much of that is done (0 to 1).
-using TrainingProgress = std::function<void(const std::string& stage, double share)>;
+// Called now and then with what is being counted, how much of it is done, and of how much.
+using TrainingProgress =
+    std::function<void(const std::string& unit, std::size_t done, std::size_t total)>;
 
 // Hierarchical k-means: a tree whose words have no weights yet (all 0). Reorders the descriptors,
 // which may lie in a mapped file, and needs about one byte for each besides, and the tree. The same

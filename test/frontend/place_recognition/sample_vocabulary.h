@@ -23,6 +23,6 @@ FeatureSet features_of(std::vector<Descriptor> descriptors);
 // Calls body from the last index to the first.
 void backward_for(std::size_t count, const std::function<void(std::size_t)>& body);
 
-inline void no_progress(const std::string&, double) {}
+inline void no_progress(const std::string&, std::size_t, std::size_t) {}
 
 }  // namespace hybrid_slam

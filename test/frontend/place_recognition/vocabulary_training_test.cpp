@@ -73,17 +73,19 @@ TEST_CASE("A word weighs the logarithm of how few images have it") {
 
 TEST_CASE("Training tells how far it is") {
   std::string last;
-  double share = 0;
+  std::size_t done = 0, total = 0;
   std::vector<Descriptor> descriptors = random_descriptors(3000, 300, 6);
   train_vocabulary(descriptors, DescriptorKind::kRootSift, {.levels = 2}, serial_for,
-                   [&](const std::string& stage, double done) {
-                     if (stage == last) CHECK(done >= share);
-                     CHECK(done <= 1);
-                     last = stage;
-                     share = done;
+                   [&](const std::string& unit, std::size_t now, std::size_t of) {
+                     if (unit == last) CHECK(now >= done);
+                     CHECK(now <= of);
+                     last = unit;
+                     done = now;
+                     total = of;
                    });
-  CHECK(last == "level 2 of 2");
-  CHECK(share == 1);
+  CHECK(last == "nodes split at level 1 of 2");
+  CHECK(done == 10);
+  CHECK(total == 10);
 }
 
 TEST_CASE("Training refuses what cannot be trained") {
