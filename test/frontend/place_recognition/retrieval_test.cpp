@@ -1,4 +1,4 @@
-// Real images, found again by changed copies of them among others.
+// Real images, none of which the default vocabulary has seen, found again by changed copies of them.
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
@@ -11,9 +11,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "frontend/features/sift.h"
+#include "frontend/place_recognition/default_vocabulary.h"
 #include "frontend/place_recognition/guided_matching.h"
 #include "frontend/place_recognition/inverted_index.h"
-#include "test/frontend/place_recognition/sample_vocabulary.h"
 
 namespace hybrid_slam {
 namespace {
@@ -67,19 +67,15 @@ cv::Mat changed(const cv::Mat& image, std::uint64_t seed) {
   return result;
 }
 
-// 10,000 words of the rendered sequence H1, which shows nothing of what is looked for.
-Vocabulary trained_on_rendered_images(SiftExtractor& sift, const std::string& data) {
-  std::vector<Descriptor> descriptors;
-  std::vector<std::uint64_t> ends;
-  for (const std::string& path : images_below(data + "/uwsynth/hybrid/H1", 60)) {
-    const FeatureSet features = features_of_image(sift, load(path));
-    descriptors.insert(descriptors.end(), features.descriptors.begin(), features.descriptors.end());
-    ends.push_back(descriptors.size());
-  }
-  const std::vector<Descriptor> by_image = descriptors;
-  const Vocabulary tree = train_vocabulary(descriptors, DescriptorKind::kRootSift, {.levels = 4},
-                                           serial_for, no_progress);
-  return weigh_words(tree, by_image, ends, serial_for, no_progress);
+TEST_CASE("The default vocabulary is small and has the shape that it should have") {
+  const Vocabulary vocabulary = default_vocabulary();
+  CHECK(vocabulary.kind() == DescriptorKind::kRootSift);
+  CHECK(vocabulary.depth() == 4);
+  CHECK(vocabulary.guide_level() == 2);
+  CHECK(vocabulary.words() > 9000);
+  CHECK(vocabulary.words() <= 10000);
+  const auto& weights = vocabulary.tables().weights;
+  CHECK(*std::max_element(weights.begin(), weights.end()) > 3);
 }
 
 TEST_CASE("Changed copies of real images are found among all of them", "[slow]") {
@@ -89,7 +85,7 @@ TEST_CASE("Changed copies of real images are found among all of them", "[slow]")
     return;
   }
   const auto sift = make_sift({.max_features = 1000});
-  const Vocabulary vocabulary = trained_on_rendered_images(*sift, data);
+  const Vocabulary vocabulary = default_vocabulary();
   InvertedIndex index(vocabulary);
   std::vector<cv::Mat> images;
   for (const std::string& path : images_below(std::string(data) + "/underwater_images", kImages)) {
