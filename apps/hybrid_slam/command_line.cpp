@@ -121,6 +121,8 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--checkpoint-every", line.checkpoint_every,
                  "write map.hslam on the way, every so many keyframes")
       ->check(CLI::Range(1, 1000000).description(""));
+  app.add_option("--vocabulary", line.vocabulary,
+                 "file of a vocabulary of RootSIFT, to find lost frames with (default: built in)");
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
   try {
     app.parse(argc, argv);

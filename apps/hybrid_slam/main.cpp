@@ -13,6 +13,7 @@
 #include "backend/problem/solver_log.h"
 #include "cameras/input_error.h"
 #include "cameras/output_file.h"
+#include "frontend/place_recognition/vocabulary_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -45,6 +46,10 @@ std::string checkpoint(const CommandLine& line, const MapSnapshot& map) {
 }
 
 int run(const CommandLine& line) {
+  RunOptions options;
+  if (!line.vocabulary.empty()) {
+    options.vocabulary = load_vocabulary(line.vocabulary, DescriptorKind::kRootSift);
+  }
   const auto sequence =
       open_sequence(line.dataset, line.layout, line.sequence, line.cameras, line.truth_convention);
   make_output_folder(line.out);
@@ -69,7 +74,6 @@ int run(const CommandLine& line) {
   };
   hooks.cancelled = &interrupted;
   hooks.checkpoint = [&](const MapSnapshot& map) { return checkpoint(line, map); };
-  RunOptions options;
   options.threads = line.threads;
   options.limit = line.limit;
   options.rate = line.rate;

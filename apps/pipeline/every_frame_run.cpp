@@ -9,7 +9,7 @@ RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
   const std::size_t total = run.frames_of(source.size());
   Recorder recorder(result, hooks, total);
   LocalMapping mapping(options);
-  FrameTracking tracking(source, options, mapping, recorder, result.times);
+  FrameTracking tracking(source, options, run.vocabulary, mapping, recorder, result.times);
   CheckpointSchedule checkpoints(run.checkpoint_every);
   const auto publish = [&] { result.map = mapping.snapshot(); };
   const auto add_keyframe = [&](const std::optional<MappingJob>& job) {

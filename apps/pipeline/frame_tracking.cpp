@@ -5,13 +5,15 @@
 namespace hybrid_slam {
 
 FrameTracking::FrameTracking(const FrameSource& source, const SlamOptions& options,
-                             LocalMapping& mapping, Recorder& recorder, StageTimes& times)
-    : stereo_(mapping.add_camera(source.camera()), source.camera(), options.tracking),
+                             const Vocabulary& vocabulary, LocalMapping& mapping,
+                             Recorder& recorder, StageTimes& times)
+    : places_(std::make_shared<KeyframeDatabase>(vocabulary)),
+      stereo_(mapping.add_camera(source.camera()), source.camera(), options.tracking, places_),
       recorder_(recorder),
       times_(times) {
   if (source.fisheye() != nullptr) {
     fisheye_.emplace(mapping.add_camera(*source.fisheye()), *source.fisheye(),
-                     options.fisheye.tracking);
+                     options.fisheye.tracking, places_);
   }
 }
 
@@ -33,6 +35,7 @@ std::optional<FrameSet> FrameTracking::next(OrderedLoader& loader) {
 std::optional<MappingJob> FrameTracking::track(Frame stereo, const MapSnapshot& map,
                                                bool allow_keyframe) {
   StageClock clock(times_);
+  places_->follow(map);
   TrackedFrame tracked = stereo_.track(std::move(stereo), map, allow_keyframe);
   clock.lap("track");
   stereo_reference_ = tracked.reference;
@@ -48,6 +51,7 @@ std::optional<MappingJob> FrameTracking::track_fisheye(FrameSet frames, const Ma
     return std::nullopt;
   }
   StageClock clock(times_);
+  places_->follow(map);
   TrackedFrame tracked =
       fisheye_->track(std::move(*frames.fisheye), map, stereo_reference_, allow_keyframe);
   clock.lap("track_fisheye");

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "apps/pipeline/local_mapping.h"
 #include "apps/pipeline/ordered_loader.h"
 #include "apps/pipeline/recorder.h"
+#include "frontend/place_recognition/keyframe_database.h"
 #include "frontend/tracking/fisheye_tracker.h"
 #include "frontend/tracking/stereo_tracker.h"
 
@@ -15,8 +17,8 @@ namespace hybrid_slam {
 class FrameTracking {
  public:
   // Adds the source's cameras to the map.
-  FrameTracking(const FrameSource& source, const SlamOptions& options, LocalMapping& mapping,
-                Recorder& recorder, StageTimes& times);
+  FrameTracking(const FrameSource& source, const SlamOptions& options, const Vocabulary& vocabulary,
+                LocalMapping& mapping, Recorder& recorder, StageTimes& times);
 
   // Waits for the next frames that could be read. None at the end, or when the run is cancelled.
   std::optional<FrameSet> next(OrderedLoader& loader);
@@ -32,6 +34,7 @@ class FrameTracking {
  private:
   std::optional<MappingJob> finish(CameraKind camera, TrackedFrame tracked, const MapSnapshot& map);
 
+  std::shared_ptr<KeyframeDatabase> places_;
   StereoTracker stereo_;
   std::optional<FisheyeTracker> fisheye_;
   Recorder& recorder_;

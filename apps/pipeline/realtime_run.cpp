@@ -161,7 +161,7 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
   const std::size_t total = run.frames_of(source.size());
   Recorder recorder(result, hooks, total);
   LocalMapping local_mapping(options);
-  FrameTracking tracking(source, options, local_mapping, recorder, result.times);
+  FrameTracking tracking(source, options, run.vocabulary, local_mapping, recorder, result.times);
   CheckpointWorker checkpoints(hooks.checkpoint, run.checkpoint_every);
   MappingWorker mapping(local_mapping, checkpoints);
   std::optional<PacedCamera> camera;

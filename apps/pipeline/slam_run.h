@@ -12,6 +12,7 @@
 #include "apps/io/stage_times.h"
 #include "apps/pipeline/frame_source.h"
 #include "apps/pipeline/slam_options.h"
+#include "frontend/place_recognition/default_vocabulary.h"
 #include "frontend/tracking/stereo_tracker.h"
 
 namespace hybrid_slam {
@@ -22,6 +23,7 @@ struct RunOptions {
   // Realtime: images per second, dropped when the pipeline is behind; 0: they wait for it.
   double rate = 0;
   int checkpoint_every = 0;  // keyframes: so often the map is saved on the way; 0: never
+  Vocabulary vocabulary = default_vocabulary();  // that lost frames are looked for with
 
   // How many frames are processed of those that there are.
   std::size_t frames_of(std::size_t available) const {

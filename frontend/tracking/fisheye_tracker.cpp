@@ -39,10 +39,11 @@ std::string FisheyeTrackerOptions::validate() const {
 }
 
 FisheyeTracker::FisheyeTracker(CameraId camera_id, const Calibrated<KannalaBrandt>& camera,
-                               const FisheyeTrackerOptions& options)
+                               const FisheyeTrackerOptions& options,
+                               std::shared_ptr<const KeyframeDatabase> places)
     : camera_id_(camera_id),
       options_(options),
-      matcher_(camera_id, camera, options),
+      matcher_(camera_id, camera, options, std::move(places)),
       last_(camera_id) {
   const std::string error = options.validate();
   if (!error.empty()) {
@@ -95,9 +96,6 @@ std::vector<KeyframeId> FisheyeTracker::candidates(const MapSnapshot& map,
     add(last_.reference());
   }
   add(stereo_reference);
-  for (const KeyframeId id : newest_keyframes(map, options_.relocalization.max_keyframes)) {
-    add(id);
-  }
   return keyframes;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "backend/map/map_snapshot.h"
@@ -21,13 +22,15 @@ struct FisheyeTrackerOptions : TrackerOptions {
 // frames of a low rate an arm can swing anywhere. A frame is found by the descriptors of a
 // keyframe, PnP on bearings in RANSAC and a guided search: first in the reference, the keyframe of
 // either camera that shared most landmarks with the last frame, then in the stereo pair's
-// reference; when the last frame was lost, in all recent keyframes. Then the local map, as for
-// stereo frames. One thread at a time; never changes the map.
+// reference, then in the keyframes that look most like it. Then the local map, as for stereo
+// frames. One thread at a time; never changes the map.
 class FisheyeTracker {
  public:
-  // Throws std::invalid_argument if the options are not valid.
+  // `places`: where to look for lost frames (MapMatcher). Throws std::invalid_argument if the
+  // options are not valid.
   FisheyeTracker(CameraId camera_id, const Calibrated<KannalaBrandt>& camera,
-                 const FisheyeTrackerOptions& options);
+                 const FisheyeTrackerOptions& options,
+                 std::shared_ptr<const KeyframeDatabase> places = nullptr);
 
   // `stereo_reference`: of the stereo frame of the same time, invalid if that is lost.
   // `allow_keyframe`: false while mapping has more waiting than it can take.

@@ -117,7 +117,39 @@ std::optional<MapMatcher::LocalMapMatch> MapMatcher::match_local_map(
 
 bool MapMatcher::relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
                             Frame& frame) const {
-  auto found = hybrid_slam::relocalize(map, view_of(frame), keyframes, options_.matcher,
+  const RelocalizationOptions& options = options_.relocalization;
+  const auto match_all = [&](KeyframeId id) {
+    return match_keyframe(map, id, frame.features.left, options.ratio,
+                          options.max_descriptor_distance);
+  };
+  if (relocalize(map, keyframes, match_all, frame)) {
+    return true;
+  }
+  if (places_ != nullptr && places_->knows(frame.features.left.kind)) {
+    return find_place(map, keyframes, frame);
+  }
+  return relocalize(map, newest_keyframes(map, options.max_keyframes), match_all, frame);
+}
+
+bool MapMatcher::find_place(const MapSnapshot& map, std::span<const KeyframeId> tried,
+                            Frame& frame) const {
+  const RelocalizationOptions& options = options_.relocalization;
+  const ImageWords words = places_->words_of(frame.features.left);
+  std::vector<KeyframeId> keyframes;
+  for (const SimilarKeyframe& similar :
+       places_->similar(words.bow, static_cast<std::size_t>(options.max_keyframes), tried)) {
+    keyframes.push_back(similar.keyframe);
+  }
+  const auto match_guided = [&](KeyframeId id) {
+    return match_keyframe_guided(map, id, places_->index_of(id), frame.features.left, words.index,
+                                 options.ratio, options.max_descriptor_distance);
+  };
+  return relocalize(map, keyframes, match_guided, frame);
+}
+
+bool MapMatcher::relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
+                            const KeyframeMatcher& match, Frame& frame) const {
+  auto found = hybrid_slam::relocalize(map, view_of(frame), keyframes, match, options_.matcher,
                                        options_.pose, options_.relocalization);
   if (!found) {
     return false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -8,6 +9,7 @@
 #include "backend/map/map_edit.h"
 #include "backend/map/map_snapshot.h"
 #include "frontend/matching/projection_matcher.h"
+#include "frontend/place_recognition/keyframe_database.h"
 #include "frontend/pose/pose_refinement.h"
 #include "frontend/tracking/frame.h"
 #include "frontend/tracking/keyframe_policy.h"
@@ -39,8 +41,13 @@ std::vector<LandmarkId> valid_ids(const std::vector<LandmarkId>& ids);
 // pose and landmarks and leaves better ones there.
 class MapMatcher {
  public:
-  MapMatcher(CameraId camera_id, const Camera& camera, const TrackerOptions& options)
-      : camera_(camera), options_(options), refiner_(camera_id, camera, options.refinement) {}
+  // `places` may be null; who owns it lets it follow the map.
+  MapMatcher(CameraId camera_id, const Camera& camera, const TrackerOptions& options,
+             std::shared_ptr<const KeyframeDatabase> places)
+      : camera_(camera),
+        options_(options),
+        refiner_(camera_id, camera, options.refinement),
+        places_(std::move(places)) {}
 
   FeatureView view_of(const Frame& frame) const;
 
@@ -65,7 +72,9 @@ class MapMatcher {
                                                const std::vector<LandmarkId>& seeds,
                                                int min_inliers, Frame& frame) const;
 
-  // Finds the frame without a prediction, in the first of `keyframes` that shows it.
+  // Finds the frame without a prediction, in the first of `keyframes` that shows it, or else
+  // anywhere in the map: in the keyframes that look most like it, or in the newest ones where there
+  // are no places, or none for descriptors of this kind.
   bool relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
                   Frame& frame) const;
 
@@ -73,9 +82,14 @@ class MapMatcher {
   void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }
 
  private:
+  bool relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
+                  const KeyframeMatcher& match, Frame& frame) const;
+  bool find_place(const MapSnapshot& map, std::span<const KeyframeId> tried, Frame& frame) const;
+
   Camera camera_;
   TrackerOptions options_;
   TrackRefiner refiner_;
+  std::shared_ptr<const KeyframeDatabase> places_;
 };
 
 }  // namespace hybrid_slam

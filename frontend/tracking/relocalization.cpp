@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frontend/matching/brute_force.h"
+#include "frontend/place_recognition/guided_matching.h"
 
 namespace hybrid_slam {
 namespace {
@@ -62,11 +63,10 @@ void search_around(const MapSnapshot& map, const FeatureView& view,
 }
 
 std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const FeatureView& view,
-                                             KeyframeId id, const ProjectionMatcherOptions& matcher,
+                                             KeyframeId id, const std::vector<LandmarkId>& matched,
+                                             const ProjectionMatcherOptions& matcher,
                                              const PoseRefinementOptions& pose,
                                              const RelocalizationOptions& options) {
-  const auto matched =
-      match_keyframe(map, id, view.features, options.ratio, options.max_descriptor_distance);
   std::vector<std::size_t> keypoint;
   const auto observations = pose_observations(map, view.features, view.u_right, matched, keypoint);
   if (observations.size() < static_cast<std::size_t>(options.min_matches)) {
@@ -140,6 +140,28 @@ std::vector<LandmarkId> match_keyframe(const MapSnapshot& map, KeyframeId keyfra
   return result;
 }
 
+std::vector<LandmarkId> match_keyframe_guided(const MapSnapshot& map, KeyframeId keyframe,
+                                              const DirectIndex& keyframe_index,
+                                              const FeatureSet& features, const DirectIndex& index,
+                                              double ratio, double max_descriptor_distance) {
+  const Keyframe& reference = map.at(keyframe);
+  const auto landmark_of = [&](int feature) {
+    return reference.landmarks[static_cast<std::size_t>(feature)];
+  };
+  DirectIndex with_landmark;
+  std::copy_if(keyframe_index.begin(), keyframe_index.end(), std::back_inserter(with_landmark),
+               [&](const NodeFeature& entry) { return landmark_of(entry.feature).valid(); });
+  BruteForceOptions options;
+  options.ratio = ratio;
+  options.max_descriptor_distance = max_descriptor_distance;
+  std::vector<LandmarkId> result(features.size());
+  for (const DescriptorMatch& match :
+       match_guided(reference.observations->features, with_landmark, features, index, options)) {
+    result[static_cast<std::size_t>(match.train)] = landmark_of(match.query);
+  }
+  return result;
+}
+
 std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const FeatureSet& features,
                                                const std::vector<float>& u_right,
                                                const std::vector<LandmarkId>& landmarks,
@@ -169,6 +191,7 @@ std::vector<KeyframeId> newest_keyframes(const MapSnapshot& map, int count) {
 
 std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const FeatureView& view,
                                            std::span<const KeyframeId> keyframes,
+                                           const KeyframeMatcher& match,
                                            const ProjectionMatcherOptions& matcher,
                                            const PoseRefinementOptions& pose,
                                            const RelocalizationOptions& options) {
@@ -176,7 +199,7 @@ std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const Feature
     if (map.find(keyframe) == nullptr) {
       continue;
     }
-    auto found = try_keyframe(map, view, keyframe, matcher, pose, options);
+    auto found = try_keyframe(map, view, keyframe, match(keyframe), matcher, pose, options);
     if (found) {
       return found;
     }

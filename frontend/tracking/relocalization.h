@@ -1,18 +1,20 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "frontend/matching/projection_matcher.h"
+#include "frontend/place_recognition/image_words.h"
 #include "frontend/pose/pnp_ransac.h"
 #include "frontend/pose/pose_refinement.h"
 
 namespace hybrid_slam {
 
 struct RelocalizationOptions {
-  int max_keyframes = 50;  // newest first, where nothing else is known
+  int max_keyframes = 20;  // the most similar ones, where nothing else is known
   double ratio = 0.75;     // best against second best descriptor
   double max_descriptor_distance = 0.7;
   int min_matches = 15;
@@ -38,6 +40,16 @@ std::vector<LandmarkId> match_keyframe(const MapSnapshot& map, KeyframeId keyfra
                                        const FeatureSet& features, double ratio,
                                        double max_descriptor_distance);
 
+// The same, among features below the same node of the vocabulary: a fraction of the work, and most
+// of the matches. The indices are those of all the keyframe's features and of the image's.
+std::vector<LandmarkId> match_keyframe_guided(const MapSnapshot& map, KeyframeId keyframe,
+                                              const DirectIndex& keyframe_index,
+                                              const FeatureSet& features, const DirectIndex& index,
+                                              double ratio, double max_descriptor_distance);
+
+// Matches between the landmarks of a keyframe and the image, one entry per keypoint.
+using KeyframeMatcher = std::function<std::vector<LandmarkId>(KeyframeId)>;
+
 // What refine_pose needs, for the keypoints that have a landmark in the map; `keypoint` receives
 // the index of each.
 std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const FeatureSet& features,
@@ -48,11 +60,12 @@ std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const Fea
 // The newest keyframes, at most `count` of them, newest first.
 std::vector<KeyframeId> newest_keyframes(const MapSnapshot& map, int count);
 
-// Finds an image in the map without any prediction: descriptors against one of `keyframes` after
-// the other, PnP in RANSAC, guided search. None if no keyframe yields min_inliers; ids that are not
+// Finds an image in the map without any prediction: `match` with one of `keyframes` after the
+// other, PnP in RANSAC, guided search. None if no keyframe yields min_inliers; ids that are not
 // in the map are passed over.
 std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const FeatureView& view,
                                            std::span<const KeyframeId> keyframes,
+                                           const KeyframeMatcher& match,
                                            const ProjectionMatcherOptions& matcher,
                                            const PoseRefinementOptions& pose,
                                            const RelocalizationOptions& options);

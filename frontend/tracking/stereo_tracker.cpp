@@ -39,13 +39,14 @@ std::string StereoTrackerOptions::validate() const {
 }
 
 StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStereo>& camera,
-                             const StereoTrackerOptions& options)
+                             const StereoTrackerOptions& options,
+                             std::shared_ptr<const KeyframeDatabase> places)
     : camera_id_(camera_id),
       camera_(camera),
       options_(options),
       odometer_(camera, options.odometer),
       disparity_(camera, options.disparity),
-      matcher_(camera_id, camera, options),
+      matcher_(camera_id, camera, options, std::move(places)),
       last_(camera_id) {
   const std::string error = options.validate();
   if (!error.empty()) {
@@ -81,8 +82,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
       result.reference = last_.reference();
       result.source = PoseSource::kOdometer;
     }
-  } else if (matcher_.relocalize(map, newest_keyframes(map, options_.relocalization.max_keyframes),
-                                 frame) &&
+  } else if (matcher_.relocalize(map, {}, frame) &&
              track_local_map(frame, map, options_.relocalization.min_inliers, result)) {
     result.source = PoseSource::kRelocalization;
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,9 +36,11 @@ struct StereoTrackerOptions : TrackerOptions {
 // frames should become keyframes, and finds them in the next snapshot.
 class StereoTracker {
  public:
-  // Throws std::invalid_argument if the options are not valid.
+  // `places`: where to look for lost frames (MapMatcher). Throws std::invalid_argument if the
+  // options are not valid.
   StereoTracker(CameraId camera_id, const Calibrated<RectifiedStereo>& camera,
-                const StereoTrackerOptions& options);
+                const StereoTrackerOptions& options,
+                std::shared_ptr<const KeyframeDatabase> places = nullptr);
 
   // `allow_keyframe`: false while mapping has more waiting than it can take.
   TrackedFrame track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);

@@ -195,6 +195,34 @@ TEST_CASE("a configuration that cannot be used is refused with file, line and ke
                 reason);
 }
 
+TEST_CASE("a vocabulary that cannot be used is refused before anything is done") {
+  const TempFolder folder;
+  const fs::path file = folder.path() / "words.voc";
+  std::string numbers;
+  for (int i = 0; i < 128; ++i) numbers += "0.1 ";
+  std::string reason;
+  SECTION("missing") { reason = "words.voc: "; }
+  SECTION("garbage") {
+    write_text(file, "no words\nat all\n");
+    reason = "words.voc:1: ";
+  }
+  SECTION("cut off") {
+    write_text(file, "HSLAMVOC12");
+    reason = "words.voc: the file is cut off";
+  }
+  SECTION("a shorter descriptor") {
+    write_text(file, "2 1 0 0\n0 1 0.5 0.5 1\n0 1 0.1 0.1 1\n");
+    reason = "words.voc:2: too short for a node";
+  }
+  SECTION("plain SIFT") {
+    write_text(file, "2 1 0 0\n0 1 " + numbers + "1\n0 1 " + numbers + "2\n");
+    reason = "words.voc: a vocabulary of plain SIFT";
+  }
+  check_refused(run_program(HYBRID_SLAM, {"data", "--vocabulary", "words.voc"}, folder.path()), 3,
+                reason);
+  CHECK(!fs::exists(folder.path() / "out"));
+}
+
 TEST_CASE("bad usage is refused with one line and code 2") {
   const TempFolder folder;
   write_kitti_survey(folder.path() / "data", 2);

@@ -270,7 +270,7 @@ TEST_CASE("help is printed, with layouts, results and exit codes") {
   for (const char* const word :
        {"--layout", "--sequence", "--config", "--out", "--mode", "--rate", "--cameras",
         "--features", "--seed", "--threads", "--device", "--limit", "--checkpoint-every", "--quiet",
-        "stereo_online.tum", "Exit codes", "130"}) {
+        "--vocabulary", "stereo_online.tum", "Exit codes", "130"}) {
     INFO(word);
     CHECK(outcome.out.find(word) != std::string::npos);
   }

@@ -1,4 +1,5 @@
-// Real images, none of which the default vocabulary has seen, found again by changed copies of them.
+// Real images, none of which the default vocabulary has seen, found again by changed copies of
+// them.
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>

@@ -29,6 +29,16 @@ std::vector<KeyframeId> newest(const FilledMap& filled, int count = 50) {
   return newest_keyframes(filled.map.view(), count);
 }
 
+std::optional<RelocalizedFrame> find_in(const std::vector<KeyframeId>& keyframes,
+                                        const FilledMap& filled, const FrameView& frame) {
+  const MapSnapshot& map = filled.map.view();
+  const FeatureView view = frame.view();
+  const auto match = [&](KeyframeId id) {
+    return match_keyframe(map, id, view.features, 0.75, 0.7);
+  };
+  return relocalize(map, view, keyframes, match, {}, {}, {});
+}
+
 double center_distance(const Rigid3d& a, const Rigid3d& b) {
   return (origin_in_a(a) - origin_in_a(b)).norm();
 }
@@ -51,7 +61,7 @@ TEST_CASE("A frame from anywhere in the map is found in it") {
   const FilledMap filled = map_of(scene);
   for (const std::size_t index : {std::size_t{1}, std::size_t{11}, std::size_t{23}}) {
     const FrameView frame(scene, index);
-    const auto found = relocalize(filled.map.view(), frame.view(), newest(filled), {}, {}, {});
+    const auto found = find_in(newest(filled), filled, frame);
     REQUIRE(found);
     CHECK(found->inliers >= 50);
     CHECK(center_distance(found->cam_from_world, frame.true_pose()) < 0.02);
@@ -74,7 +84,7 @@ TEST_CASE("A fisheye is found in a map of stereo keyframes") {
   const FilledMap filled = map_of(scene);  // every second frame: the stereo ones
   const FrameView frame(scene, 25);
   REQUIRE(baseline(frame.camera()) == 0);
-  const auto found = relocalize(filled.map.view(), frame.view(), newest(filled), {}, {}, {});
+  const auto found = find_in(newest(filled), filled, frame);
   REQUIRE(found);
   CHECK(center_distance(found->cam_from_world, frame.true_pose()) < 0.03);
   CHECK(right_share(filled, frame, *found) > 0.98);
@@ -84,16 +94,15 @@ TEST_CASE("A frame of another place is not found") {
   const SyntheticScene scene = make_synthetic_scene(orbit());
   const SyntheticScene elsewhere = make_synthetic_scene(orbit(2));
   const FilledMap filled = map_of(scene);
-  CHECK(!relocalize(filled.map.view(), FrameView(elsewhere, 5).view(), newest(filled), {}, {}, {}));
+  CHECK(!find_in(newest(filled), filled, FrameView(elsewhere, 5)));
 }
 
 TEST_CASE("Only so many keyframes are tried, newest first") {
   const SyntheticScene scene = make_synthetic_scene(orbit());
   const FilledMap filled = map_of(scene);
   const FrameView far_from_newest(scene, 13);  // across the circle
-  CHECK(!relocalize(filled.map.view(), far_from_newest.view(), newest(filled, 1), {}, {}, {}));
-  const auto found =
-      relocalize(filled.map.view(), FrameView(scene, 29).view(), newest(filled, 1), {}, {}, {});
+  CHECK(!find_in(newest(filled, 1), filled, far_from_newest));
+  const auto found = find_in(newest(filled, 1), filled, FrameView(scene, 29));
   REQUIRE(found);
   CHECK(found->keyframe == filled.keyframes.back());
 }
@@ -107,7 +116,7 @@ TEST_CASE("Descriptors of another kind match nothing") {
        match_keyframe(filled.map.view(), filled.keyframes[5], frame.features(), 0.75, 0.7)) {
     CHECK(!id.valid());
   }
-  CHECK(!relocalize(filled.map.view(), frame.view(), newest(filled), {}, {}, {}));
+  CHECK(!find_in(newest(filled), filled, frame));
 }
 
 TEST_CASE("RelocalizationOptions out of range are refused") {
