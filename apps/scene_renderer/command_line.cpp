@@ -63,6 +63,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   Difficulty difficulty = Difficulty::kNormal;
   std::uint32_t seed = 0;
   std::optional<int> frames;
+  std::optional<double> width;
   std::string resolution;
   const std::map<std::string, ImageFormat> formats{{"jpg", ImageFormat::kJpeg},
                                                    {"png", ImageFormat::kPng}};
@@ -79,6 +80,9 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       ->capture_default_str();
   app.add_option("--frames", frames, "(default: 120, survey 400)")
       ->check(CLI::Range(1, 100000).description(""));
+  app.add_option("--width", width,
+                 "of a survey's spiral [m] (default: what the frames cover at 0.28 m/s)")
+      ->option_text("M");
   app.add_option("--resolution", resolution,
                  "of the stereo images (default 1024x768); the fisheye's are squares as wide")
       ->option_text("WxH");
@@ -89,6 +93,12 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   try {
     app.parse(argc, argv);
     if (line.out.empty()) throw CLI::ValidationError("OUT: \"\" is no name of a folder");
+    if (width && kind != SceneKind::kSurvey) {
+      throw CLI::ValidationError("--width needs --kind survey");
+    }
+    if (width && !(*width >= 1 && *width <= 50)) {  // not NaN, which CLI lets pass
+      throw CLI::ValidationError("--width: is no width between 1 and 50 m");
+    }
     if (!resolution.empty()) parse_resolution(resolution, line);
     if (line.sequence.empty()) {
       line.sequence = kind == SceneKind::kSurvey ? "stereo" : "hybrid";
@@ -105,6 +115,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   }
   line.options = make_scene_options(kind, difficulty, seed);
   line.options.frames = frames.value_or(line.options.frames);
+  line.options.width = width.value_or(line.options.width);
   if (line.threads == 0) line.threads = default_thread_count();
   return line;
 }

@@ -8,6 +8,7 @@
 
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
+#include "apps/scene_renderer/rig_motion.h"
 #include "cameras/input_error.h"
 #include "cameras/output_file.h"
 #include "frontend/input/text_file.h"
@@ -89,6 +90,7 @@ Json scene_json(const SceneSequence& sequence) {
             {"seed", options.seed},
             {"frames", options.frames},
             {"rate_hz", options.rate}};
+  if (options.kind == SceneKind::kSurvey) json["width_m"] = 2 * survey_radius(options);
   if (options.kind != SceneKind::kHybrid) return json;
   Json blind = Json::array(), away = Json::array(), in_view = Json::array(),
        visible = Json::array();

@@ -14,13 +14,13 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kHalfBaseline = 0.075;  // [m]
-constexpr double kSurveyStep = 0.055;    // [m] per frame
-constexpr double kSpiralSpacing = 0.5;   // [m] between its turns
-constexpr double kSpiralShare = 0.65;    // of the path's length; the rest are arms across
-constexpr double kSurveyAltitude = 1.5;  // [m]
-constexpr double kLeastClearance = 0.3;  // [m] of the wrist above the ground
-const Vector3d kSceneMiddle(0, 0, 0.2);  // what the hovering vehicle looks at
+constexpr double kHalfBaseline = 0.075;    // [m]
+constexpr double kSurveyStep = 0.055;      // [m] per frame, unless the width asks for more
+constexpr double kTurnSteps = 100.0 / 11;  // steps between two turns of the spiral
+constexpr double kSpiralShare = 0.65;      // of the path's length; the rest are arms across
+constexpr double kSurveyAltitude = 1.5;    // [m]
+constexpr double kLeastClearance = 0.3;    // [m] of the wrist above the ground
+const Vector3d kSceneMiddle(0, 0, 0.2);    // what the hovering vehicle looks at
 
 // A smooth wandering number, about -1 to 1, that comes round in about `period` [s].
 double wander(const SceneOptions& options, int stream, double period, double time) {
@@ -127,18 +127,26 @@ std::vector<RigMoment> hybrid_motion(const SceneOptions& options, const RayCaste
   return moments;
 }
 
+// Way from frame to frame [m]: turns of a spiral kTurnSteps steps apart, of kSpiralShare of all
+// steps, fill a circle of the given width.
+double survey_step(const SceneOptions& options) {
+  if (options.width <= 0) return kSurveyStep;
+  return options.width / 2 * std::sqrt(kPi / (kTurnSteps * kSpiralShare * options.frames));
+}
+
 // Points of the survey's path, closer to each other than its frames.
-std::vector<Eigen::Vector2d> survey_path(double radius, double length) {
+std::vector<Eigen::Vector2d> survey_path(double radius, double step, double length) {
   constexpr double kFine = 0.01;  // [m]
+  const double spacing = kTurnSteps * step;
   std::vector<Eigen::Vector2d> path;
   double angle = 0;
   const auto spiral = [&] {
-    const double r = kSpiralSpacing * angle / (2 * kPi);
+    const double r = spacing * angle / (2 * kPi);
     return Eigen::Vector2d(r * std::cos(angle), r * std::sin(angle));
   };
   while (spiral().norm() < radius) {
     path.push_back(spiral());
-    angle += kFine / std::max(spiral().norm(), kSpiralSpacing / (2 * kPi));
+    angle += kFine / std::max(spiral().norm(), spacing / (2 * kPi));
   }
   const auto steps = static_cast<std::size_t>(length / kFine) + 100;
   while (path.size() < steps) {
@@ -153,8 +161,9 @@ std::vector<Eigen::Vector2d> survey_path(double radius, double length) {
 }
 
 std::vector<RigMoment> survey_motion(const SceneOptions& options) {
-  const double length = options.frames * kSurveyStep;
-  const std::vector<Eigen::Vector2d> path = survey_path(survey_radius(options), length);
+  const double step = survey_step(options);
+  const std::vector<Eigen::Vector2d> path =
+      survey_path(survey_radius(options), step, options.frames * step);
   const auto mean_over = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
     const auto last = static_cast<std::ptrdiff_t>(path.size()) - 1;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -167,7 +176,7 @@ std::vector<RigMoment> survey_motion(const SceneOptions& options) {
   for (int i = 0; i < options.frames; ++i) {
     RigMoment moment;
     moment.time = i / options.rate;
-    const auto at = static_cast<std::ptrdiff_t>(std::lround(100 * kSurveyStep * i));
+    const auto at = static_cast<std::ptrdiff_t>(std::lround(100 * step * i));
     const Eigen::Vector2d place = mean_over(at - 20, at + 20);  // rounds the corners
     const Eigen::Vector2d ahead = mean_over(at, at + 60) - mean_over(at - 60, at);
     const Vector3d sway = options.sway * wander3(options, 3, 9, moment.time);
@@ -186,8 +195,9 @@ std::vector<RigMoment> survey_motion(const SceneOptions& options) {
 }  // namespace
 
 double survey_radius(const SceneOptions& options) {
+  if (options.width > 0) return options.width / 2;
   const double spiral = kSpiralShare * options.frames * kSurveyStep;
-  return std::max(0.4, std::sqrt(spiral * kSpiralSpacing / kPi));
+  return std::max(0.4, std::sqrt(spiral * kTurnSteps * kSurveyStep / kPi));
 }
 
 std::vector<RigMoment> make_motion(const SceneOptions& options, const RayCaster& seafloor) {

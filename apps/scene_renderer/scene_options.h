@@ -20,7 +20,8 @@ struct SceneOptions {
   Difficulty difficulty = Difficulty::kNormal;
   std::uint32_t seed = 0;
   int frames = 120;
-  double rate = 3;  // [Hz]
+  double rate = 3;   // [Hz]
+  double width = 0;  // of a survey's spiral [m]; 0: what the frames cover at 0.055 m each
 
   // What the difficulty chooses.
   Water water;

@@ -87,5 +87,23 @@ TEST_CASE("a survey keeps its pace and height and comes back across its own path
   CHECK(crossings > 30);
 }
 
+TEST_CASE("a survey is as wide as asked for, and covers it evenly") {
+  SceneOptions options = make_scene_options(SceneKind::kSurvey, Difficulty::kNormal, 1);
+  options.frames = 700;
+  options.width = 7;
+  CHECK(survey_radius(options) == 3.5);
+  const RayCaster flat(make_icosphere(2, Material::kGround, 0), 1);
+  const auto motion = make_motion(options, flat);
+  double left = 0, right = 0, longest = 0;
+  for (std::size_t i = 1; i < motion.size(); ++i) {
+    const Eigen::Vector3d place = motion[i].world_from_left.translation();
+    left = std::min(left, place.x());
+    right = std::max(right, place.x());
+    longest = std::max(longest, (place - motion[i - 1].world_from_left.translation()).norm());
+  }
+  CHECK(right - left == Approx(7).margin(0.9));  // a turn is 0.88 m
+  CHECK(longest < 0.13);
+}
+
 }  // namespace
 }  // namespace hybrid_slam

@@ -110,6 +110,8 @@ TEST_CASE("bad command lines and folders end in one line") {
   refused({"a", "--preset", "impossible"}, 2, "--preset");
   refused({"a", "--frames", "0"}, 2, "--frames");
   refused({"a", "--frames", "nan"}, 2, "--frames");
+  refused({"a", "--kind", "survey", "--width", "nan"}, 2, "--width");
+  refused({"a", "--width", "7"}, 2, "--width needs --kind survey");
   refused({"a", "--seed", "-1"}, 2, "--seed");
   refused({"a", "--threads", "0"}, 2, "--threads");
   refused({"a", "--sequence", "../b"}, 2, "\"../b\" is no name of a sequence");
