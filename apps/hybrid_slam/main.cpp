@@ -2,14 +2,13 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/io/progress_line.h"
+#include "apps/pipeline/interrupt.h"
 #include "backend/problem/solver_log.h"
 #include "cameras/input_error.h"
 #include "cameras/output_file.h"
@@ -17,15 +16,6 @@
 
 namespace hybrid_slam {
 namespace {
-
-std::atomic<bool> interrupted = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
-
-// The first Ctrl-C ends the run in order; a second one kills the program as usual.
-void on_signal(int signal) {
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
-}
 
 // Before hours of work, not after: can the results be written? Nothing is left of the trial; of an
 // older run the summary goes, so that it is there only if this one has come to its end.
@@ -45,7 +35,7 @@ std::string checkpoint(const CommandLine& line, const MapSnapshot& map) {
   return {};
 }
 
-int run(const CommandLine& line) {
+int run(const CommandLine& line, const Interrupt& interrupt) {
   RunOptions options;
   if (!line.vocabulary.empty()) {
     options.vocabulary = load_vocabulary(line.vocabulary, DescriptorKind::kRootSift);
@@ -72,7 +62,7 @@ int run(const CommandLine& line) {
     progress.finish();
     spdlog::warn(text);
   };
-  hooks.cancelled = &interrupted;
+  hooks.cancelled = interrupt.token();
   hooks.checkpoint = [&](const MapSnapshot& map) { return checkpoint(line, map); };
   options.threads = line.threads;
   options.limit = line.limit;
@@ -113,9 +103,8 @@ int guarded_main(int argc, char** argv) {
     if (!line) {
       return exit_code;
     }
-    std::signal(SIGINT, on_signal);
-    std::signal(SIGTERM, on_signal);
-    return run(*line);
+    const Interrupt interrupt;
+    return run(*line, interrupt);
   } catch (const InputError& error) {
     spdlog::error(error.what());
     return kExitBadInput;

@@ -1,19 +1,18 @@
 #include "apps/pipeline/paced_camera.h"
 
-#include <algorithm>
+#include <utility>
 
 namespace hybrid_slam {
 namespace {
 
 constexpr std::size_t kBacklog = 2;  // images waiting for the pipeline
-constexpr std::chrono::milliseconds kCancelInterval{20};
 
 }  // namespace
 
-PacedCamera::PacedCamera(std::size_t total, double rate, const std::atomic<bool>* cancelled)
-    : cancelled_(cancelled),
-      indices_(kBacklog),
-      thread_([this, total, rate](const std::stop_token& stop) { work(stop, total, rate); }) {}
+PacedCamera::PacedCamera(std::size_t total, double rate, std::stop_token cancelled)
+    : indices_(kBacklog),
+      thread_([this, total, rate](const std::stop_token& stop) { work(stop, total, rate); }),
+      cancel_(std::move(cancelled), [this] { thread_.request_stop(); }) {}
 
 int PacedCamera::finish() {
   thread_.request_stop();
@@ -35,18 +34,11 @@ void PacedCamera::work(const std::stop_token& stop, std::size_t total, double ra
   indices_.close();
 }
 
-// False if no further image shall come. A signal handler may set `cancelled_` and cannot wake
-// anybody: it is looked at now and then.
+// False if no further image shall come.
 bool PacedCamera::wait_until(Clock::time_point due, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (!stop.stop_requested() && (cancelled_ == nullptr || !*cancelled_)) {
-    const auto now = Clock::now();
-    if (now >= due) {
-      return true;
-    }
-    wake_.wait_until(lock, stop, std::min(due, now + kCancelInterval), [] { return false; });
-  }
-  return false;
+  wake_.wait_until(lock, stop, due, [] { return false; });
+  return !stop.stop_requested();
 }
 
 }  // namespace hybrid_slam

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <stop_token>
@@ -17,8 +17,8 @@ namespace hybrid_slam {
 // time.
 class PacedCamera {
  public:
-  // `cancelled`, if not null, ends it at once when it becomes true, also while it waits.
-  PacedCamera(std::size_t total, double rate, const std::atomic<bool>* cancelled);
+  // A request to stop ends it at once, also while it waits.
+  PacedCamera(std::size_t total, double rate, std::stop_token cancelled);
 
   // Waits for the next index; none at the end.
   std::optional<std::size_t> next() { return indices_.pop(); }
@@ -32,12 +32,12 @@ class PacedCamera {
   void work(const std::stop_token& stop, std::size_t total, double rate);
   bool wait_until(Clock::time_point due, const std::stop_token& stop);
 
-  const std::atomic<bool>* cancelled_;
   Channel<std::size_t> indices_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
   int dropped_ = 0;  // the thread's own until finish()
   std::jthread thread_;
+  std::stop_callback<std::function<void()>> cancel_;
 };
 
 }  // namespace hybrid_slam

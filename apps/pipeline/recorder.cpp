@@ -60,7 +60,7 @@ void Recorder::became_keyframe(CameraKind camera, std::int64_t frame_index, Keyf
 }
 
 bool Recorder::cancelled() {
-  result_.cancelled = result_.cancelled || (hooks_.cancelled != nullptr && *hooks_.cancelled);
+  result_.cancelled = result_.cancelled || hooks_.cancelled.stop_requested();
   return result_.cancelled;
 }
 

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -64,12 +64,12 @@ struct RunFailure {
 // Saves a map and returns what went wrong, empty if nothing did.
 using SaveMap = std::function<std::string(const MapSnapshot&)>;
 
-// What a run needs from outside. `cancelled` may be set at any moment, from a signal handler too:
-// the run then ends in order, with what it has.
+// What a run needs from outside. When `cancelled` is requested, at any moment, the run ends in
+// order, with what it has.
 struct RunHooks {
   std::function<void(const RunProgress&)> progress;  // after each frame, in the calling thread
   std::function<void(const std::string&)> warning;   // one line each
-  const std::atomic<bool>* cancelled = nullptr;
+  std::stop_token cancelled;
   // Saves the map so far. What goes wrong is a warning, what it throws an internal error as well;
   // the run goes on. Every-frame: in the calling thread; realtime: in another, one call at a time,
   // and maps that come meanwhile are left out but for the last.

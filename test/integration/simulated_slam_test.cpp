@@ -167,11 +167,11 @@ TEST_CASE("A run can be cancelled at any frame and keeps what it has", "[integra
   const SimulatedSource source(make_synthetic_scene(orbit(40)));
   for (const bool realtime : {false, true}) {
     for (const int after : {1, 7, 23}) {
-      std::atomic<bool> cancelled = false;
+      std::stop_source cancel;
       RunHooks hooks;
-      hooks.cancelled = &cancelled;
+      hooks.cancelled = cancel.get_token();
       hooks.progress = [&](const RunProgress& progress) {
-        cancelled = static_cast<int>(progress.done) >= after;
+        if (static_cast<int>(progress.done) >= after) cancel.request_stop();
       };
       const RunResult result = realtime ? run_realtime(source, slam_options(), {}, hooks)
                                         : run_every_frame(source, slam_options(), {}, hooks);
@@ -184,10 +184,10 @@ TEST_CASE("A run can be cancelled at any frame and keeps what it has", "[integra
 
 TEST_CASE("A run that waits for a slow camera ends at once when it is cancelled", "[integration]") {
   const SimulatedSource source(make_synthetic_scene(orbit(60)));
-  std::atomic<bool> cancelled = false;
+  std::stop_source cancel;
   std::atomic<int> done = 0;
   RunHooks hooks;
-  hooks.cancelled = &cancelled;
+  hooks.cancelled = cancel.get_token();
   hooks.progress = [&](const RunProgress&) { ++done; };
   RunOptions run;
   run.rate = 0.001;  // the second image is due in a quarter of an hour
@@ -195,7 +195,7 @@ TEST_CASE("A run that waits for a slow camera ends at once when it is cancelled"
   const std::jthread canceller([&] {
     while (done == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    cancelled = true;
+    cancel.request_stop();
   });
   const RunResult result = run_realtime(source, slam_options(), run, hooks);
   CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(20));
