@@ -1,26 +1,64 @@
 #include "backend/backend.h"
 
+#include <algorithm>
 #include <stdexcept>
+#include <utility>
 
+#include "backend/problem/loop_correction.h"
 #include "backend/problem/solve_bundle.h"
 
 namespace hybrid_slam {
 
 namespace {
 
-template <typename Options>
-void require_valid(const Options& options, const char* name) {
-  if (const std::string wrong = options.validate(); !wrong.empty()) {
-    throw std::invalid_argument(std::string("BackendOptions: ") + name + ": " + wrong);
-  }
+PoseConstraint constraint_of(const LoopMeasurement& loop) {
+  PoseConstraint constraint;
+  constraint.a = loop.keyframe;
+  constraint.b = loop.match;
+  constraint.a_from_b = loop.keyframe_from_match;
+  constraint.loop = true;
+  return constraint;
+}
+
+std::vector<PoseConstraint> constraints_of(const std::vector<LoopMeasurement>& loops) {
+  std::vector<PoseConstraint> constraints;
+  for (const LoopMeasurement& loop : loops) constraints.push_back(constraint_of(loop));
+  return constraints;
+}
+
+std::vector<LoopEnds> ends_of(const std::vector<PoseConstraint>& loops) {
+  std::vector<LoopEnds> ends;
+  for (const PoseConstraint& loop : loops) ends.emplace_back(loop.a, loop.b);
+  return ends;
+}
+
+// How far the map's newer keyframe is from where the loop sees it.
+void write_discrepancy(const MapSnapshot& map, const LoopMeasurement& loop, LoopOutcome& outcome) {
+  const Rigid3d by_map =
+      map.at(loop.keyframe).cam_from_world * inverse(map.at(loop.match).cam_from_world);
+  const Rigid3d off = inverse(without_scale(loop.keyframe_from_match)) * by_map;
+  outcome.translation = off.translation().norm();
+  outcome.rotation = so3_log(off.rotation()).norm();
 }
 
 }  // namespace
 
-Backend::Backend(const BackendOptions& options) : options_(options) {
-  require_valid(options.local.problem, "local bundle");
-  require_valid(options.incremental, "incremental");
-  require_valid(options.full.problem, "full bundle");
+std::string BackendOptions::validate() const {
+  const auto named = [](const char* name, const std::string& wrong) {
+    return wrong.empty() ? wrong : std::string("backend: ") + name + ": " + wrong;
+  };
+  for (const std::string& error :
+       {named("local bundle", local.problem.validate()),
+        named("incremental", incremental.validate()), named("full bundle", full.problem.validate()),
+        named("loops", loops.validate())}) {
+    if (!error.empty()) return error;
+  }
+  return max_refused_loops < 0 ? "backend: max_refused_loops must not be negative" : "";
+}
+
+Backend::Backend(const BackendOptions& options, Map map) : options_(options), map_(std::move(map)) {
+  const std::string wrong = options.validate();
+  if (!wrong.empty()) throw std::invalid_argument(wrong);
 }
 
 CameraId Backend::add_camera(const Camera& camera) { return map_.add_camera(camera); }
@@ -35,13 +73,76 @@ BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
   if (options_.local_method == LocalMethod::kBundle) {
     return take_in(solve_bundle(view(), make_local_bundle(view(), newest, options_.local), stop));
   }
-  if (!smoother_) smoother_.emplace(options_.incremental);
-  return take_in(smoother_->update(snapshot(), newest));
+  return take_in(smoother().update(snapshot(), newest));
+}
+
+MapSmoother& Backend::smoother() {
+  if (!smoother_) {
+    smoother_.emplace(options_.incremental);
+    for (const PoseConstraint& loop : closed_) smoother_->add_loop(loop);
+  }
+  return *smoother_;
+}
+
+LoopOutcome Backend::close(const LoopMeasurement& loop) {
+  LoopOutcome outcome;
+  if (view().find(loop.keyframe) == nullptr || view().find(loop.match) == nullptr) return outcome;
+  write_discrepancy(view(), loop, outcome);
+  refused_.push_back(loop);  // until it is taken
+  LoopClosureOptions options = options_.loops;
+  for (const LoopMeasurement& one : refused_) options.graph.with_scale |= one.with_scale;
+  const LoopClosure closure =
+      close_loop(view(), constraints_of(refused_), ends_of(closed_), options);
+  outcome.chi2 = closure.chi2;
+  outcome.loops = static_cast<int>(closure.taken.size());
+  outcome.end = closure.taken.empty() ? LoopEnd::kImplausible : LoopEnd::kClosed;
+  if (!closure.taken.empty()) take_in(closure, options.graph);
+  const auto most = static_cast<std::size_t>(options_.max_refused_loops);
+  while (refused_.size() > most) refused_.erase(refused_.begin());
+  return outcome;
+}
+
+// The measurements are weighted and the map is moved before its sides become one: merged, they
+// would be neither here nor there.
+void Backend::take_in(const LoopClosure& closure, const LoopGraphOptions& options) {
+  std::vector<LoopMeasurement> taken;
+  for (const std::size_t i : closure.taken) {
+    PoseConstraint loop = constraint_of(refused_[i]);
+    loop.information = motion_information(view(), loop.a, loop.b, loop.a_from_b, options);
+    closed_.push_back(loop);
+    taken.push_back(refused_[i]);
+  }
+  for (auto i = closure.taken.rbegin(); i != closure.taken.rend(); ++i) {
+    refused_.erase(refused_.begin() + static_cast<std::ptrdiff_t>(*i));
+  }
+  smoother_.reset();
+  map_.move(closure.correction.cam_from_world, closure.correction.point_in_world);
+  for (const LoopMeasurement& loop : taken) merge_sides(loop);
+}
+
+void Backend::merge_sides(const LoopMeasurement& loop) {
+  MapEdit edit;
+  edit.merged = loop.same;
+  edit.new_observations = loop.new_observations;
+  map_.apply(edit);
+  map_.set_keep(loop.keyframe);
+  map_.set_keep(loop.match);
+}
+
+BundleResult solve_full(const MapSnapshot& map, const FullBundleOptions& options,
+                        const std::stop_token& stop) {
+  return solve_bundle(map, make_full_bundle(map, options), stop);
+}
+
+BundleSummary Backend::take_in_full(BundleResult result) {
+  if (result.cam_from_world.empty()) return result.summary;
+  smoother_.reset();
+  carry_the_rest(view(), result);
+  return take_in(std::move(result));
 }
 
 BundleSummary Backend::optimize_full(std::stop_token stop) {
-  smoother_.reset();
-  return take_in(solve_bundle(view(), make_full_bundle(view(), options_.full), stop));
+  return take_in_full(solve_full(view(), options_.full, stop));
 }
 
 BundleSummary Backend::take_in(BundleResult result) {

@@ -3,11 +3,14 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <vector>
 
 #include "backend/incremental/map_smoother.h"
+#include "backend/map/loop_measurement.h"
 #include "backend/map/map.h"
 #include "backend/problem/full_bundle.h"
 #include "backend/problem/local_bundle.h"
+#include "backend/problem/loop_closure.h"
 
 namespace hybrid_slam {
 
@@ -22,14 +25,34 @@ struct BackendOptions {
   LocalBundleOptions local;
   MapSmootherOptions incremental;
   FullBundleOptions full;
+  LoopClosureOptions loops;
+  int max_refused_loops = 8;  // that are remembered: the newest
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
+};
+
+enum class LoopEnd {
+  kClosed,
+  kImplausible,  // the map cannot be bent to it at a plausible price; see close_loop()
+  kGone,         // a keyframe of it is no longer in the map
+};
+
+// What became of a loop.
+struct LoopOutcome {
+  LoopEnd end = LoopEnd::kGone;
+  double translation = 0;  // by which the loop's newer keyframe was off from it [m]
+  double rotation = 0;     // [rad]
+  double chi2 = 0;         // of the map bent to it
+  int loops = 0;           // taken: more than one where others agreed with it
 };
 
 // The synchronous facade of the backend: owns the map, applies what the frontend sends, optimises.
 // Knows no threads; a pipeline gives it to one worker, and everyone else reads snapshots.
 class Backend {
  public:
-  // Throws std::invalid_argument if the options are not valid.
-  explicit Backend(const BackendOptions& options);
+  // Goes on with `map`. Throws std::invalid_argument if the options are not valid.
+  explicit Backend(const BackendOptions& options, Map map = {});
 
   CameraId add_camera(const Camera& camera);
   KeyframeId add(const NewKeyframe& keyframe);
@@ -41,7 +64,17 @@ class Backend {
   // keeps what it has when stopped; an incremental update is short.
   BundleSummary optimize_local(KeyframeId newest, std::stop_token stop = {});
 
-  // Bundle adjustment of everything but the origin.
+  // Closes a loop: the loop graph moves every keyframe, landmarks follow, those of the two sides
+  // that are the same are merged. A loop that is not believed changes nothing, but is remembered: a
+  // later one may agree with it.
+  LoopOutcome close(const LoopMeasurement& loop);
+
+  // Takes in a bundle adjustment of everything that was made of an earlier snapshot (solve_full):
+  // keyframes born since follow through the spanning tree, landmarks with their reference keyframe.
+  // What was solved before a loop was closed must not be taken in after it.
+  BundleSummary take_in_full(BundleResult result);
+
+  // Bundle adjustment of everything but the origin: solve_full and take_in_full.
   BundleSummary optimize_full(std::stop_token stop = {});
 
   std::shared_ptr<const MapSnapshot> snapshot();
@@ -50,10 +83,19 @@ class Backend {
 
  private:
   BundleSummary take_in(BundleResult result);
+  void take_in(const LoopClosure& closure, const LoopGraphOptions& options);
+  void merge_sides(const LoopMeasurement& loop);
+  MapSmoother& smoother();
 
   BackendOptions options_;
   Map map_;
-  std::optional<MapSmoother> smoother_;  // in step with the map; none if that was moved since
+  std::optional<MapSmoother> smoother_;   // in step with the map; none if that was moved since
+  std::vector<LoopMeasurement> refused_;  // oldest first
+  std::vector<PoseConstraint> closed_;    // loops, as measured, weighted
 };
+
+// Bundle adjustment of everything but the origin, of a snapshot: in any thread.
+BundleResult solve_full(const MapSnapshot& map, const FullBundleOptions& options,
+                        const std::stop_token& stop = {});
 
 }  // namespace hybrid_slam

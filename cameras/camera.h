@@ -23,6 +23,8 @@ struct Calibrated {
   std::array<double, M::kParamCount> params{};
   int width = 0;
   int height = 0;
+
+  bool operator==(const Calibrated&) const = default;
 };
 
 // One of the models, chosen at run time. Visited when a residual is created or a batch is

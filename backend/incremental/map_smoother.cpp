@@ -17,6 +17,7 @@ MapSmoother::MapSmoother(const MapSmootherOptions& options)
 BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest) {
   const auto start = std::chrono::steady_clock::now();
   take_in_keyframes(*map, newest);
+  take_in_loops(*map);
   const std::vector<LandmarkId> changed =
       known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
   for (const LandmarkId id : changed) take_in_landmark(*map, id);
@@ -52,6 +53,16 @@ void MapSmoother::take_in_keyframes(const MapSnapshot& map, KeyframeId last) {
         {keyframe->cam_from_world, keyframe->observations->camera.value, id == map.origin()});
     keyframe_of_.push_back(id);
   }
+}
+
+void MapSmoother::take_in_loops(const MapSnapshot& map) {
+  for (const PoseConstraint& loop : new_loops_) {
+    if (map.find(loop.a) == nullptr || map.find(loop.b) == nullptr) continue;
+    take_in_keyframes(map, std::max(loop.a, loop.b));
+    solver_.add_edge({pose_of_[loop.a.value], pose_of_[loop.b.value], without_scale(loop.a_from_b),
+                      loop.information.topLeftCorner<6, 6>(), true});
+  }
+  new_loops_.clear();
 }
 
 // Brings what the solver has of a landmark in line with the map.

@@ -15,7 +15,10 @@ struct MapSmootherOptions {
   // Poses of the map follow the estimate once they are off by more [m, rad].
   double min_motion = 1e-5;
 
-  MapSmootherOptions() { solver.loss = Loss::kHuber; }
+  MapSmootherOptions() {
+    solver.loss = Loss::kHuber;
+    solver.loop_loss = Loss::kCauchy;
+  }
   std::string validate() const;
 };
 
@@ -26,6 +29,11 @@ struct MapSmootherOptions {
 class MapSmoother {
  public:
   explicit MapSmoother(const MapSmootherOptions& options);
+
+  // A motion measured between two keyframes, with its weight and without scale: an edge of the
+  // problem from the next update on, whose map must have both. With a window it holds the present
+  // to a past that no longer varies.
+  void add_loop(const PoseConstraint& loop) { new_loops_.push_back(loop); }
 
   // The map as it is now, with `newest` in it. The result holds what moved, and as outliers the
   // observations beyond their threshold of the landmarks that `newest` sees: they are out of the
@@ -49,6 +57,7 @@ class MapSmoother {
   };
 
   void take_in_keyframes(const MapSnapshot& map, KeyframeId last);
+  void take_in_loops(const MapSnapshot& map);
   void take_in_landmark(const MapSnapshot& map, LandmarkId id);
   std::uint32_t add_observation(const MapSnapshot& map, std::uint32_t point,
                                 const Observation& seen);
@@ -64,6 +73,7 @@ class MapSmoother {
   std::vector<std::uint32_t> pose_of_;   // by keyframe
   std::vector<KeyframeId> keyframe_of_;  // by pose
   std::unordered_map<LandmarkId, KnownLandmark> landmarks_;
+  std::vector<PoseConstraint> new_loops_;
 };
 
 }  // namespace hybrid_slam

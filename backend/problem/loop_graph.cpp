@@ -1,24 +1,54 @@
 #include "backend/problem/loop_graph.h"
 
+#include <algorithm>
+#include <set>
+
 namespace hybrid_slam {
 
 namespace {
 
-Matrix7d edge_information(const LoopGraphOptions& options) {
-  Vector7d sigma;
-  sigma << Eigen::Vector3d::Constant(options.translation_sigma),
-      Eigen::Vector3d::Constant(options.rotation_sigma), options.scale_sigma;
-  return sigma.cwiseProduct(sigma).cwiseInverse().asDiagonal();
+bool is_metric(const MapSnapshot& map, KeyframeId id) {
+  return baseline(map.camera(map.at(id))) > 0;
 }
 
-PoseConstraint remembered(const Keyframe& a, const Keyframe& b, const Matrix7d& information) {
-  return {a.id, b.id, Sim3d(a.cam_from_world * inverse(b.cam_from_world)), information, false};
-}
+// Motions that the map remembers, each pair once.
+class Remembered {
+ public:
+  Remembered(const MapSnapshot& map, const LoopGraphOptions& options,
+             std::vector<PoseConstraint>& constraints)
+      : map_(map), options_(options), constraints_(constraints) {}
+
+  void add(KeyframeId a, KeyframeId b) {
+    if (map_.find(a) == nullptr || map_.find(b) == nullptr) return;
+    if (!pairs_.insert(std::minmax(a, b)).second) return;
+    const Sim3d a_from_b(map_.at(a).cam_from_world * inverse(map_.at(b).cam_from_world));
+    constraints_.push_back(
+        {a, b, a_from_b, motion_information(map_, a, b, a_from_b, options_), false});
+  }
+
+ private:
+  const MapSnapshot& map_;
+  const LoopGraphOptions& options_;
+  std::vector<PoseConstraint>& constraints_;
+  std::set<std::pair<KeyframeId, KeyframeId>> pairs_;
+};
 
 }  // namespace
 
+Matrix7d motion_information(const MapSnapshot& map, KeyframeId a, KeyframeId b,
+                            const Sim3d& a_from_b, const LoopGraphOptions& options) {
+  const double translation = std::max(options.min_translation_sigma,
+                                      options.translation_share * a_from_b.translation().norm());
+  Vector7d sigma;
+  sigma << Eigen::Vector3d::Constant(translation),
+      Eigen::Vector3d::Constant(options.rotation_sigma),
+      is_metric(map, a) && is_metric(map, b) ? options.metric_scale_sigma : options.scale_sigma;
+  return sigma.cwiseProduct(sigma).cwiseInverse().asDiagonal();
+}
+
 ProblemConfig make_loop_graph(const MapSnapshot& map, const std::vector<PoseConstraint>& loops,
-                              const LoopGraphOptions& options) {
+                              const LoopGraphOptions& options,
+                              const std::vector<LoopEnds>& closed) {
   ProblemConfig config;
   config.options = options.problem;
   config.with_scale = options.with_scale;
@@ -27,22 +57,20 @@ ProblemConfig make_loop_graph(const MapSnapshot& map, const std::vector<PoseCons
   config.variable_poses = map.keyframe_ids();
   std::erase(config.variable_poses, map.origin());
 
-  const Matrix7d information = edge_information(options);
+  Remembered remembered(map, options, config.constraints);
   for (const KeyframeId id : map.keyframe_ids()) {
     const Keyframe& keyframe = map.at(id);
-    if (keyframe.parent.valid()) {
-      config.constraints.push_back(remembered(map.at(keyframe.parent), keyframe, information));
-    }
+    if (keyframe.parent.valid()) remembered.add(keyframe.parent, id);
     for (const Covisible& edge : keyframe.covisible) {
-      const bool once = edge.id < id;
-      const bool in_tree = edge.id == keyframe.parent || map.at(edge.id).parent == id;
-      if (once && !in_tree && edge.shared_landmarks >= options.min_shared_landmarks) {
-        config.constraints.push_back(remembered(map.at(edge.id), keyframe, information));
-      }
+      if (edge.shared_landmarks >= options.min_shared_landmarks) remembered.add(edge.id, id);
     }
   }
+  for (const auto& [a, b] : closed) remembered.add(a, b);
   for (PoseConstraint loop : loops) {
-    if (loop.information.isIdentity(0)) loop.information = information;
+    if (loop.information.isIdentity(0)) {
+      if (map.find(loop.a) == nullptr || map.find(loop.b) == nullptr) continue;
+      loop.information = motion_information(map, loop.a, loop.b, loop.a_from_b, options);
+    }
     loop.loop = true;
     config.constraints.push_back(loop);
   }

@@ -1,8 +1,6 @@
 #include "backend/problem/solve_bundle.h"
 
-#include <algorithm>
-#include <map>
-
+#include "backend/problem/loop_correction.h"
 #include "backend/problem/map_graph.h"
 #include "backend/problem/solve_graph.h"
 
@@ -44,37 +42,6 @@ void write_estimate(const MapGraph& made, BundleResult& result) {
     if (graph.cameras[i].refined != 0) {
       result.cameras.emplace_back(CameraId(i), graph.cameras[i].camera);
     }
-  }
-}
-
-// new_world_from_old_world at each keyframe of a loop graph that varies.
-std::map<KeyframeId, Sim3d> corrections(const MapSnapshot& map, const MapGraph& made) {
-  std::map<KeyframeId, Sim3d> moved;
-  const FactorGraph& graph = made.graph;
-  for (std::size_t i = 0; i < made.frames.size(); ++i) {
-    const bool scaled = !graph.similarities.empty();
-    if (scaled ? graph.similarities[i].fixed : graph.frames[i].fixed) continue;
-    const Sim3d cam_from_new =
-        scaled ? graph.similarities[i].cam_from_world : Sim3d(graph.frames[i].cam_from_world);
-    const Sim3d cam_from_old(map.at(made.frames[i]).cam_from_world);
-    moved.emplace(made.frames[i], inverse(cam_from_new) * cam_from_old);
-  }
-  return moved;
-}
-
-// Poses of similarities become rigid by dividing by their scale, which leaves every view as it is.
-void write_loop_correction(const MapSnapshot& map, const MapGraph& made, BundleResult& result) {
-  const std::map<KeyframeId, Sim3d> moved = corrections(map, made);
-  result.cam_from_world.clear();
-  for (const auto& [id, new_from_old] : moved) {
-    const Sim3d cam_from_old(map.at(id).cam_from_world);
-    result.cam_from_world.emplace_back(id, without_scale(cam_from_old * inverse(new_from_old)));
-  }
-  for (const LandmarkId id : map.landmark_ids()) {
-    const Landmark& landmark = map.at(id);
-    const auto reference = moved.find(landmark.reference);
-    if (reference == moved.end()) continue;
-    result.point_in_world.emplace_back(id, reference->second * landmark.point_in_world);
   }
 }
 

@@ -135,7 +135,7 @@ class PoseGraphSolver {
   std::vector<Candidate> candidates_;
 };
 
-void require(const std::string& wrong, const char* what) {
+void require_valid(const std::string& wrong, const char* what) {
   if (!wrong.empty()) throw std::invalid_argument(what + wrong);
 }
 
@@ -157,9 +157,9 @@ PoseGraphSummary solve_pose_graph(FactorGraph& graph, const PoseGraphOptions& op
                                   const std::stop_token& stop,
                                   const std::function<void(const IterationReport&)>& progress) {
   const auto begin = std::chrono::steady_clock::now();
-  require(options.validate(), "PoseGraphOptions: ");
-  require(graph.validate(), "FactorGraph: ");
-  require(is_pose_graph(graph) ? "" : "not a pose graph", "FactorGraph: ");
+  require_valid(options.validate(), "PoseGraphOptions: ");
+  require_valid(graph.validate(), "FactorGraph: ");
+  require_valid(is_pose_graph(graph) ? "" : "not a pose graph", "FactorGraph: ");
   PoseGraphSolver solver(graph, options, stop, progress);
   PoseGraphSummary result = solver.solve();
   set_poses(solver.poses, graph);

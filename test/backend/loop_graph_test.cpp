@@ -6,89 +6,12 @@
 
 #include "backend/problem/solve_bundle.h"
 #include "cameras/geometry/se3.h"
-#include "test/support/filled_map.h"
+#include "test/backend/drifted_circle.h"
 
 #include <catch2/catch.hpp>
 
 namespace hybrid_slam {
 namespace {
-
-// A circle flown once.
-FilledMap circle() {
-  SyntheticSceneOptions options;
-  options.trajectory = SceneTrajectory::kOrbit;
-  options.times = 24;
-  options.landmarks = 1500;
-  options.noise = 0;
-  return fill_map(make_synthetic_scene(options), {});
-}
-
-struct Truth {
-  std::vector<Rigid3d> cam_from_world;
-  std::vector<Eigen::Vector3d> points;  // by landmark
-};
-
-Truth truth_of(const MapSnapshot& map) {
-  Truth truth;
-  for (const KeyframeId id : map.keyframe_ids()) {
-    truth.cam_from_world.push_back(map.at(id).cam_from_world);
-  }
-  for (const LandmarkId id : map.landmark_ids()) truth.points.push_back(map.at(id).point_in_world);
-  return truth;
-}
-
-// Every step ends `drift` further in the frame of the camera, and is `growth` times as large as it
-// should be, compared with the one before. Landmarks keep their place before their reference.
-void let_drift(FilledMap& filled, const Truth& truth, const Vector6d& drift, double growth) {
-  const MapSnapshot& map = filled.map.view();
-  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
-  std::vector<Sim3d> drifted_from_true{Sim3d()};  // of the world, at each keyframe
-  Rigid3d estimate = truth.cam_from_world[0];
-  double scale = 1;
-  for (std::size_t i = 1; i < truth.cam_from_world.size(); ++i) {
-    Rigid3d step = truth.cam_from_world[i] * inverse(truth.cam_from_world[i - 1]);
-    scale *= growth;
-    step.translation() *= scale;
-    estimate = se3_exp(drift) * step * estimate;
-    poses.emplace_back(map.keyframe_ids()[i], estimate);
-    const Sim3d scaling(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), scale);
-    drifted_from_true.push_back(inverse(Sim3d(estimate)) * scaling *
-                                Sim3d(truth.cam_from_world[i]));
-  }
-  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
-  for (const LandmarkId id : map.landmark_ids()) {
-    const Landmark& landmark = map.at(id);
-    points.emplace_back(id, drifted_from_true[landmark.reference.value] * landmark.point_in_world);
-  }
-  filled.map.move(poses, points);
-}
-
-double worst_position_error(const MapSnapshot& map, const Truth& truth) {
-  double worst = 0;
-  for (const KeyframeId id : map.keyframe_ids()) {
-    worst = std::max(worst, (origin_in_a(map.at(id).cam_from_world) -
-                             origin_in_a(truth.cam_from_world[id.value]))
-                                .norm());
-  }
-  return worst;
-}
-
-double worst_point_error(const MapSnapshot& map, const Truth& truth) {
-  double worst = 0;
-  const std::vector<LandmarkId> ids = map.landmark_ids();
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    worst = std::max(worst, (map.at(ids[i]).point_in_world - truth.points[i]).norm());
-  }
-  return worst;
-}
-
-PoseConstraint measured(const Truth& truth, std::uint32_t a, std::uint32_t b) {
-  PoseConstraint loop;
-  loop.a = KeyframeId(a);
-  loop.b = KeyframeId(b);
-  loop.a_from_b = Sim3d(truth.cam_from_world[a] * inverse(truth.cam_from_world[b]));
-  return loop;
-}
 
 void correct(FilledMap& filled, const std::vector<PoseConstraint>& loops,
              const LoopGraphOptions& options) {
@@ -98,21 +21,8 @@ void correct(FilledMap& filled, const std::vector<PoseConstraint>& loops,
   filled.map.move(result.cam_from_world, result.point_in_world);
 }
 
-// Only neighbours along the way remember each other, so that the ends are free.
-LoopGraphOptions chain_options() {
-  LoopGraphOptions options;
-  options.min_shared_landmarks = 1 << 20;
-  return options;
-}
-
-Vector6d small_drift() {
-  Vector6d drift;
-  drift << 0.01, -0.008, 0.012, 0.004, 0.003, -0.005;
-  return drift;
-}
-
 TEST_CASE("loop graph: the tree, strong covisibility once each, and the loops") {
-  const FilledMap filled = circle();
+  const FilledMap filled = circle_map();
   const MapSnapshot& map = filled.map.view();
   LoopGraphOptions options;
   options.min_shared_landmarks = 60;
@@ -137,7 +47,9 @@ TEST_CASE("loop graph: the tree, strong covisibility once each, and the loops") 
     CHECK(found.insert(std::minmax(edge.a, edge.b)).second);
     const Rigid3d a_from_b = map.at(edge.a).cam_from_world * inverse(map.at(edge.b).cam_from_world);
     CHECK((edge.a_from_b.params - Sim3d(a_from_b).params).norm() < 1e-12);
-    CHECK(edge.information(0, 0) == Approx(1 / (0.05 * 0.05)));
+    const double sigma = std::max(0.005, 0.05 * a_from_b.translation().norm());
+    CHECK(edge.information(0, 0) == Approx(1 / (sigma * sigma)));
+    CHECK(edge.information(6, 6) == Approx(1e8));  // two stereo pairs
     CHECK(edge.information(4, 4) == Approx(1 / (0.01 * 0.01)));
   }
   CHECK(found == wanted);
@@ -148,9 +60,9 @@ TEST_CASE("loop graph: the tree, strong covisibility once each, and the loops") 
 }
 
 TEST_CASE("loop graph: a loop spreads the drift over the way, landmarks follow") {
-  FilledMap filled = circle();
-  const Truth truth = truth_of(filled.map.view());
-  let_drift(filled, truth, small_drift(), 1);
+  FilledMap filled = circle_map();
+  const MapTruth truth = truth_of(filled.map.view());
+  let_drift(filled.map, truth, small_drift(), 1);
   const double before = worst_position_error(filled.map.view(), truth);
   REQUIRE(before > 0.2);
   const auto in_reference = [](const MapSnapshot& map, LandmarkId id) -> Eigen::Vector3d {
@@ -171,10 +83,10 @@ TEST_CASE("loop graph: a loop spreads the drift over the way, landmarks follow")
 }
 
 TEST_CASE("loop graph: drift of scale takes similarities") {
-  FilledMap filled = circle();
-  const Truth truth = truth_of(filled.map.view());
+  FilledMap filled = circle_map();
+  const MapTruth truth = truth_of(filled.map.view());
   constexpr double kGrowth = 1.02;
-  let_drift(filled, truth, Vector6d::Zero(), kGrowth);
+  let_drift(filled.map, truth, Vector6d::Zero(), kGrowth);
   const double before = worst_position_error(filled.map.view(), truth);
   REQUIRE(before > 0.5);
   PoseConstraint loop = measured(truth, 0, 23);
@@ -185,6 +97,7 @@ TEST_CASE("loop graph: drift of scale takes similarities") {
   loop.information = 1e8 * Matrix7d::Identity();
   LoopGraphOptions options = chain_options();
   options.with_scale = true;
+  options.metric_scale_sigma = options.scale_sigma;  // as if the cameras were single ones
   options.problem.loop_loss = Loss::kNone;  // so far off, and so sure, it would be taken as false
   correct(filled, {loop}, options);
   CHECK(worst_position_error(filled.map.view(), truth) < 0.1 * before);
@@ -192,13 +105,13 @@ TEST_CASE("loop graph: drift of scale takes similarities") {
 }
 
 TEST_CASE("loop graph: one false loop among true ones does not bend the map") {
-  FilledMap filled = circle();
-  const Truth truth = truth_of(filled.map.view());
-  let_drift(filled, truth, 0.3 * small_drift(), 1);
+  FilledMap filled = circle_map();
+  const MapTruth truth = truth_of(filled.map.view());
+  let_drift(filled.map, truth, 0.3 * small_drift(), 1);
   std::vector<PoseConstraint> loops{measured(truth, 0, 23), measured(truth, 1, 22),
                                     measured(truth, 2, 21)};
-  FilledMap without = circle();
-  let_drift(without, truth, 0.3 * small_drift(), 1);
+  FilledMap without = circle_map();
+  let_drift(without.map, truth, 0.3 * small_drift(), 1);
   correct(without, loops, chain_options());
   const double honest = worst_position_error(without.map.view(), truth);
 

@@ -1,0 +1,85 @@
+#include "backend/problem/loop_correction.h"
+
+#include <algorithm>
+#include <map>
+#include <unordered_set>
+
+namespace hybrid_slam {
+
+namespace {
+
+// new_world_from_old_world at each keyframe of a loop graph that varies.
+std::map<KeyframeId, Sim3d> corrections(const MapSnapshot& map, const MapGraph& solved) {
+  std::map<KeyframeId, Sim3d> moved;
+  const FactorGraph& graph = solved.graph;
+  for (std::size_t i = 0; i < solved.frames.size(); ++i) {
+    const bool scaled = !graph.similarities.empty();
+    if (scaled ? graph.similarities[i].fixed : graph.frames[i].fixed) continue;
+    const Sim3d cam_from_new =
+        scaled ? graph.similarities[i].cam_from_world : Sim3d(graph.frames[i].cam_from_world);
+    const Sim3d cam_from_old(map.at(solved.frames[i]).cam_from_world);
+    moved.emplace(solved.frames[i], inverse(cam_from_new) * cam_from_old);
+  }
+  return moved;
+}
+
+// new_world_from_old_world of keyframes that a result moved, and of those that hang from them.
+class Carrier {
+ public:
+  Carrier(const MapSnapshot& now, const BundleResult& result) : now_(now) {
+    for (const auto& [id, cam_from_new] : result.cam_from_world) {
+      const Keyframe* keyframe = now.find(id);
+      if (keyframe == nullptr) continue;
+      new_from_old_.emplace(id, inverse(cam_from_new) * keyframe->cam_from_world);
+    }
+    new_from_old_.emplace(now.origin(), Rigid3d());
+  }
+
+  bool moved(KeyframeId id) const { return new_from_old_.contains(id); }
+
+  const Rigid3d& new_from_old(KeyframeId id) const {
+    while (!moved(id)) id = now_.at(id).parent;  // ends at the origin
+    return new_from_old_.at(id);
+  }
+
+ private:
+  const MapSnapshot& now_;
+  std::map<KeyframeId, Rigid3d> new_from_old_;
+};
+
+}  // namespace
+
+void write_loop_correction(const MapSnapshot& map, const MapGraph& solved, BundleResult& result) {
+  const std::map<KeyframeId, Sim3d> moved = corrections(map, solved);
+  result.cam_from_world.clear();
+  for (const auto& [id, new_from_old] : moved) {
+    const Sim3d cam_from_old(map.at(id).cam_from_world);
+    result.cam_from_world.emplace_back(id, without_scale(cam_from_old * inverse(new_from_old)));
+  }
+  for (const LandmarkId id : map.landmark_ids()) {
+    const Landmark& landmark = map.at(id);
+    const auto reference = moved.find(landmark.reference);
+    if (reference == moved.end()) continue;
+    result.point_in_world.emplace_back(id, reference->second * landmark.point_in_world);
+  }
+}
+
+void carry_the_rest(const MapSnapshot& now, BundleResult& result) {
+  const Carrier carrier(now, result);
+  for (const KeyframeId id : now.keyframe_ids()) {
+    if (carrier.moved(id)) continue;
+    const Rigid3d cam_from_new =
+        now.at(id).cam_from_world * inverse(carrier.new_from_old(now.at(id).parent));
+    result.cam_from_world.emplace_back(id, cam_from_new);
+  }
+  std::unordered_set<LandmarkId> known;
+  for (const auto& [id, point] : result.point_in_world) known.insert(id);
+  for (const LandmarkId id : now.landmark_ids()) {
+    if (known.contains(id)) continue;
+    const Landmark& landmark = now.at(id);
+    result.point_in_world.emplace_back(
+        id, carrier.new_from_old(landmark.reference) * landmark.point_in_world);
+  }
+}
+
+}  // namespace hybrid_slam
