@@ -96,6 +96,12 @@ void append_landmarks(const MapSnapshot& map, KeyframeId id, std::vector<Landmar
   }
 }
 
+template <typename Id>
+void sort_unique(std::vector<Id>& ids) {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
 }  // namespace
 
 std::string FusionOptions::validate() const {
@@ -120,9 +126,27 @@ MapEdit fuse_with_neighbours(const MapSnapshot& map, KeyframeId keyframe,
     fuse_into(map, neighbour, own, options, edit);
     append_landmarks(map, neighbour, theirs);
   }
-  std::sort(theirs.begin(), theirs.end());
-  theirs.erase(std::unique(theirs.begin(), theirs.end()), theirs.end());
+  sort_unique(theirs);
   fuse_into(map, keyframe, theirs, options, edit);
+  return edit;
+}
+
+MapEdit fuse_places(const MapSnapshot& map, KeyframeId a, KeyframeId b,
+                    const FusionOptions& options) {
+  std::vector<KeyframeId> keyframes;
+  std::vector<LandmarkId> landmarks;
+  for (const KeyframeId end : {a, b}) {
+    keyframes.push_back(end);
+    for (const Covisible& near :
+         map.covisible(end, 15, static_cast<std::size_t>(options.neighbours))) {
+      keyframes.push_back(near.id);
+    }
+  }
+  sort_unique(keyframes);
+  for (const KeyframeId id : keyframes) append_landmarks(map, id, landmarks);
+  sort_unique(landmarks);
+  MapEdit edit;
+  for (const KeyframeId id : keyframes) fuse_into(map, id, landmarks, options, edit);
   return edit;
 }
 

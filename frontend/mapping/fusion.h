@@ -25,4 +25,9 @@ struct FusionOptions {
 MapEdit fuse_with_neighbours(const MapSnapshot& map, KeyframeId keyframe,
                              const FusionOptions& options);
 
+// The same where a loop joined two places: the landmarks around either keyframe are looked for in
+// the keyframes around both.
+MapEdit fuse_places(const MapSnapshot& map, KeyframeId a, KeyframeId b,
+                    const FusionOptions& options);
+
 }  // namespace hybrid_slam
