@@ -39,6 +39,16 @@ std::vector<KeyframeId> MapSnapshot::keyframe_ids() const {
   return ids;
 }
 
+KeyframeId MapSnapshot::next_keyframe_id() const { return KeyframeId(tables_.next_keyframe); }
+
+std::vector<KeyframeId> MapSnapshot::keyframe_ids_from(KeyframeId first) const {
+  std::vector<KeyframeId> ids;
+  for (std::uint32_t id = first.value; id < tables_.next_keyframe; ++id) {
+    if (find(KeyframeId(id)) != nullptr) ids.emplace_back(id);
+  }
+  return ids;
+}
+
 std::vector<LandmarkId> MapSnapshot::landmark_ids() const {
   std::vector<LandmarkId> ids;
   ids.reserve(landmark_count());

@@ -29,6 +29,13 @@ class MapSnapshot {
   std::vector<LandmarkId> landmark_ids() const;  // ascending
   KeyframeId origin() const;                     // invalid while the map is empty
 
+  // The id that the next keyframe of the map gets: all that are in it, or ever were, have lower
+  // ones.
+  KeyframeId next_keyframe_id() const;
+
+  // Keyframes of the id `first` or a higher one, ascending. Costs next_keyframe_id() - first.
+  std::vector<KeyframeId> keyframe_ids_from(KeyframeId first) const;
+
   // Landmarks that were born, changed or erased since an earlier snapshot of the same map; some may
   // be as they were. Ascending. Costs what changed.
   std::vector<LandmarkId> changed_landmarks(const MapSnapshot& since) const;

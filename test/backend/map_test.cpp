@@ -354,6 +354,24 @@ TEST_CASE("A snapshot does not change when the map does") {
   CHECK(tiny.consistent());
 }
 
+TEST_CASE("Keyframes from an id on are those that are left of them") {
+  TinyMap tiny = map_with_origin(8);
+  const auto from = [&](std::uint32_t first) {
+    return tiny.view().keyframe_ids_from(KeyframeId(first));
+  };
+  const KeyframeId a = tiny.add(ids(0, 4)), b = tiny.add(ids(0, 4)), c = tiny.add(ids(0, 4));
+  CHECK(from(0) == tiny.view().keyframe_ids());
+  CHECK(from(b.value) == std::vector<KeyframeId>{b, c});
+  CHECK(tiny.view().next_keyframe_id() == KeyframeId(c.value + 1));
+  MapEdit edit;
+  edit.erased_keyframes = {b, c};
+  tiny.map.apply(edit);
+  CHECK(from(a.value) == std::vector<KeyframeId>{a});
+  CHECK(from(b.value).empty());
+  CHECK(tiny.view().next_keyframe_id() == KeyframeId(c.value + 1));
+  CHECK(from(c.value + 1).empty());
+}
+
 TEST_CASE("A map filled from a scene is consistent") {
   SyntheticSceneOptions options;
   options.fisheye = true;
