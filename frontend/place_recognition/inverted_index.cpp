@@ -14,10 +14,9 @@ void InvertedIndex::add(KeyframeId keyframe, const BowVector& bow) {
     slot = free_slots_.back();
     free_slots_.pop_back();
   }
-  slots_[slot].keyframe = keyframe;
+  slots_[slot] = {keyframe, bow};
   slot_of_.emplace(keyframe, slot);
   for (const WordWeight& entry : bow) {
-    slots_[slot].words.push_back(entry.word);
     postings_.at(entry.word).push_back({slot, entry.weight});
   }
 }
@@ -26,8 +25,9 @@ void InvertedIndex::remove(KeyframeId keyframe) {
   const auto found = slot_of_.find(keyframe);
   if (found == slot_of_.end()) return;
   const std::uint32_t slot = found->second;
-  for (const NodeId word : slots_[slot].words) {
-    std::erase_if(postings_[word], [&](const Posting& posting) { return posting.slot == slot; });
+  for (const WordWeight& entry : slots_[slot].bow) {
+    std::erase_if(postings_[entry.word],
+                  [&](const Posting& posting) { return posting.slot == slot; });
   }
   slots_[slot] = {};
   free_slots_.push_back(slot);

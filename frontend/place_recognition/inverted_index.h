@@ -28,7 +28,11 @@ class InvertedIndex {
   // No matter if it is not there.
   void remove(KeyframeId keyframe);
 
+  bool contains(KeyframeId keyframe) const { return slot_of_.contains(keyframe); }
   std::size_t size() const { return slot_of_.size(); }
+
+  // What was added. Throws std::out_of_range if it is not there. Valid until the next change.
+  const BowVector& bow(KeyframeId keyframe) const { return slots_[slot_of_.at(keyframe)].bow; }
 
   // The keyframes that share a word with the image, best first, of equal ones that of the lower id;
   // without those in `excluded`, which come in any order.
@@ -42,7 +46,7 @@ class InvertedIndex {
   };
   struct Slot {
     KeyframeId keyframe;  // invalid if free
-    std::vector<NodeId> words;
+    BowVector bow;
   };
 
   std::vector<std::vector<Posting>> postings_;  // one list per node

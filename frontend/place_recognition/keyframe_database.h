@@ -17,7 +17,9 @@ class KeyframeDatabase {
   explicit KeyframeDatabase(Vocabulary vocabulary);
 
   // Takes in the keyframes that are new in the map and forgets those that are gone. Keyframes whose
-  // descriptors are of another kind than the vocabulary's are never found.
+  // descriptors are of another kind than the vocabulary's are never found. The snapshots are of one
+  // map, none older than the one before. Costs what is new; a look at each keyframe only where some
+  // were erased.
   void follow(const MapSnapshot& map);
 
   bool knows(DescriptorKind kind) const { return kind == vocabulary_.kind(); }
@@ -31,15 +33,25 @@ class KeyframeDatabase {
   std::vector<SimilarKeyframe> similar(const BowVector& bow, std::size_t count,
                                        std::span<const KeyframeId> excluded) const;
 
-  // Throws std::out_of_range for a keyframe that is not here.
+  bool contains(KeyframeId id) const { return inverted_.contains(id); }
+
+  // The words of a keyframe, kept: 8 bytes each, 10 KB for 2000 features or so. Both throw
+  // std::out_of_range for a keyframe that is not here, and are valid until the next follow().
+  const BowVector& bow_of(KeyframeId id) const { return inverted_.bow(id); }
   const DirectIndex& index_of(KeyframeId id) const { return indices_.at(id); }
 
   std::size_t size() const { return indices_.size(); }
 
  private:
+  void add(const Keyframe& keyframe);
+  void forget_erased(const MapSnapshot& map);
+
   Vocabulary vocabulary_;
   InvertedIndex inverted_;
   std::map<KeyframeId, DirectIndex> indices_;
+  // Of the map as it was followed last; of its keyframes of any kind.
+  KeyframeId next_{0};
+  std::size_t followed_ = 0;
 };
 
 }  // namespace hybrid_slam

@@ -44,6 +44,23 @@ Vocabulary small_vocabulary(int branching, int levels, std::uint64_t seed) {
   return weigh_words(tree, by_image, image_ends, serial_for, no_progress);
 }
 
+Vocabulary scene_vocabulary(const SyntheticScene& scene) {
+  std::vector<Descriptor> descriptors;
+  std::vector<std::uint64_t> image_ends;
+  for (const SyntheticFrame& frame : scene.frames) {
+    const auto& seen = frame.observations->features.descriptors;
+    descriptors.insert(descriptors.end(), seen.begin(), seen.end());
+    image_ends.push_back(descriptors.size());
+  }
+  const std::vector<Descriptor> by_image = descriptors;
+  VocabularyTrainingOptions options;
+  options.branching = 8;
+  options.levels = 3;
+  const Vocabulary tree =
+      train_vocabulary(descriptors, DescriptorKind::kSynthetic, options, serial_for, no_progress);
+  return weigh_words(tree, by_image, image_ends, serial_for, no_progress);
+}
+
 Vocabulary in_floats(const Vocabulary& vocabulary) {
   auto floats = std::make_shared<std::vector<FloatDescriptor>>();
   for (const Descriptor& descriptor : vocabulary.tables().bytes) {

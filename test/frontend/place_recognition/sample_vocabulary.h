@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "frontend/place_recognition/vocabulary_training.h"
+#include "test/support/synthetic_scene.h"
 
 namespace hybrid_slam {
 
@@ -12,6 +13,9 @@ std::vector<Descriptor> random_descriptors(int count, int centers, std::uint64_t
 
 // Trained on 3000 of them.
 Vocabulary small_vocabulary(int branching = 4, int levels = 3, std::uint64_t seed = 1);
+
+// Of what is seen in a synthetic scene: 512 words.
+Vocabulary scene_vocabulary(const SyntheticScene& scene);
 
 // The same tree in floats, of plain SIFT.
 Vocabulary in_floats(const Vocabulary& vocabulary);

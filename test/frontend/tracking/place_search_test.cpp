@@ -6,8 +6,8 @@
 #include <catch2/catch.hpp>
 
 #include "frontend/place_recognition/keyframe_database.h"
-#include "frontend/place_recognition/vocabulary_training.h"
 #include "frontend/tracking/stereo_tracker.h"
+#include "test/frontend/place_recognition/sample_vocabulary.h"
 #include "test/frontend/pose/pose_scene.h"
 #include "test/support/filled_map.h"
 #include "test/support/frame_view.h"
@@ -30,22 +30,7 @@ struct Circle {
     FillOptions fill;
     fill.stride = 2;
     filled = fill_map(scene, fill);
-    std::vector<Descriptor> descriptors;
-    std::vector<std::uint64_t> image_ends;
-    for (const SyntheticFrame& frame : scene.frames) {
-      const auto& seen = frame.observations->features.descriptors;
-      descriptors.insert(descriptors.end(), seen.begin(), seen.end());
-      image_ends.push_back(descriptors.size());
-    }
-    const std::vector<Descriptor> by_image = descriptors;
-    VocabularyTrainingOptions training;
-    training.branching = 8;
-    training.levels = 3;
-    const auto quiet = [](const std::string&, std::size_t, std::size_t) {};
-    const Vocabulary tree =
-        train_vocabulary(descriptors, DescriptorKind::kSynthetic, training, serial_for, quiet);
-    places = std::make_shared<KeyframeDatabase>(
-        weigh_words(tree, by_image, image_ends, serial_for, quiet));
+    places = std::make_shared<KeyframeDatabase>(scene_vocabulary(scene));
     places->follow(map());
   }
 
@@ -78,45 +63,6 @@ TEST_CASE("The keyframes most similar to an image are those beside it") {
       CHECK(circle.steps_between(frame, keyframe.keyframe) <= 3);
     }
   }
-}
-
-TEST_CASE("A database of keyframes follows the map") {
-  Circle circle;
-  const auto best = [&] {
-    const ImageWords words = circle.places->words_of(circle.features(10));
-    return circle.places->similar(words.bow, 1, {}).at(0).keyframe;
-  };
-  const KeyframeId before = best();
-  CHECK(circle.steps_between(10, before) == 0);
-  MapEdit edit;
-  edit.erased_keyframes = {before};
-  circle.filled.map.apply(edit);
-  circle.places->follow(circle.map());
-  CHECK(circle.places->size() == circle.map().keyframe_count());
-  CHECK(best() != before);
-  CHECK_THROWS_AS(circle.places->index_of(before), std::out_of_range);
-}
-
-TEST_CASE("Keyframes of a kind that the vocabulary does not know are no places") {
-  const Circle circle;
-  KeyframeDatabase other{Vocabulary(
-      [&] {
-        static const std::vector<NodeId> first_child{1, 3, 3, 3};
-        static const std::vector<float> weights{0, 1, 1};
-        static const std::vector<Descriptor> bytes(3);
-        VocabularyTables tables;
-        tables.kind = DescriptorKind::kRootSift;
-        tables.branching = 2;
-        tables.levels = 1;
-        tables.first_child = first_child;
-        tables.weights = weights;
-        tables.bytes = bytes;
-        return tables;
-      }(),
-      nullptr)};
-  other.follow(circle.map());
-  CHECK(other.size() == 0);
-  CHECK(!other.knows(DescriptorKind::kSynthetic));
 }
 
 TEST_CASE("Guided matches of a keyframe are nearly all that brute force finds") {
