@@ -62,6 +62,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   SceneKind kind = SceneKind::kHybrid;
   Difficulty difficulty = Difficulty::kNormal;
   std::uint32_t seed = 0;
+  std::uint32_t visit = 0;
   std::optional<int> frames;
   std::optional<double> width;
   std::string resolution;
@@ -77,6 +78,11 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--sequence", line.sequence, "its name (default: the preset's, or stereo)");
   add_choice(app, "--preset", difficulty, difficulties(), "easy, normal (default) or hard");
   app.add_option("--seed", seed, "of everything random: another seafloor, another motion")
+      ->capture_default_str();
+  app.add_option(
+         "--visit", visit,
+         "of the same seafloor: other lamps, snow, noise, another motion (surveys: with the "
+         "same --width)")
       ->capture_default_str();
   app.add_option("--frames", frames, "(default: 120, survey 400)")
       ->check(CLI::Range(1, 100000).description(""));
@@ -114,6 +120,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
     return std::nullopt;
   }
   line.options = make_scene_options(kind, difficulty, seed);
+  line.options.visit = visit;
   line.options.frames = frames.value_or(line.options.frames);
   line.options.width = width.value_or(line.options.width);
   if (line.threads == 0) line.threads = default_thread_count();

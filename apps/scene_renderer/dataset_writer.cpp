@@ -90,6 +90,7 @@ Json scene_json(const SceneSequence& sequence) {
             {"seed", options.seed},
             {"frames", options.frames},
             {"rate_hz", options.rate}};
+  if (options.visit > 0) json["visit"] = options.visit;
   if (options.kind == SceneKind::kSurvey) json["width_m"] = 2 * survey_radius(options);
   if (options.kind != SceneKind::kHybrid) return json;
   Json blind = Json::array(), away = Json::array(), in_view = Json::array(),

@@ -24,7 +24,7 @@ const Vector3d kSceneMiddle(0, 0, 0.2);    // what the hovering vehicle looks at
 
 // A smooth wandering number, about -1 to 1, that comes round in about `period` [s].
 double wander(const SceneOptions& options, int stream, double period, double time) {
-  Counter random(options.seed, 9000 + stream);
+  Counter random(visit_seed(options), 9000 + stream);
   const auto turn = [&](double share, double pace) {
     return share * std::sin(2 * kPi * (random.uniform() + pace * time / period));
   };
@@ -160,10 +160,37 @@ std::vector<Eigen::Vector2d> survey_path(double radius, double step, double leng
   return path;
 }
 
+// Where another visit flies its path.
+struct PathPlacement {
+  Eigen::Vector2d shift = Eigen::Vector2d::Zero();  // [m]
+  double turn = 0;                                  // [rad], before the shift
+};
+
+PathPlacement path_placement(const SceneOptions& options) {
+  PathPlacement placement;
+  if (options.visit == 0) return placement;
+  Counter random(visit_seed(options), 8000);
+  const double way = 2 * kPi * random.uniform();
+  const double length = std::min<double>(random.uniform(0.2F, 0.4F), survey_radius(options) / 4);
+  placement.shift = length * Eigen::Vector2d(std::cos(way), std::sin(way));
+  const double turn = random.uniform(0.2F, 0.7F);
+  placement.turn = random.uniform() < 0.5F ? -turn : turn;
+  return placement;
+}
+
+// The whole path in the world. A shifted one is narrower by the shift: no visit leaves the circle.
+std::vector<Eigen::Vector2d> placed_path(const SceneOptions& options, double step) {
+  const auto [shift, turn] = path_placement(options);
+  std::vector<Eigen::Vector2d> path =
+      survey_path(survey_radius(options) - shift.norm(), step, options.frames * step);
+  const Eigen::Rotation2Dd rotation(turn);
+  for (Eigen::Vector2d& place : path) place = rotation * place + shift;
+  return path;
+}
+
 std::vector<RigMoment> survey_motion(const SceneOptions& options) {
   const double step = survey_step(options);
-  const std::vector<Eigen::Vector2d> path =
-      survey_path(survey_radius(options), step, options.frames * step);
+  const std::vector<Eigen::Vector2d> path = placed_path(options, step);
   const auto mean_over = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
     const auto last = static_cast<std::ptrdiff_t>(path.size()) - 1;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();

@@ -1,5 +1,7 @@
 #include "apps/scene_renderer/scene_options.h"
 
+#include "apps/scene_renderer/noise.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -50,6 +52,11 @@ SceneOptions make_scene_options(SceneKind kind, Difficulty difficulty, std::uint
   if (difficulty == Difficulty::kEasy) make_easy(options);
   if (difficulty == Difficulty::kHard) make_hard(options);
   return options;
+}
+
+std::uint32_t visit_seed(const SceneOptions& options) {
+  if (options.visit == 0) return options.seed;
+  return mixed_bits(static_cast<std::int32_t>(options.visit), 0, 29, options.seed);
 }
 
 SceneCameras make_scene_cameras(int stereo_width, int stereo_height) {

@@ -19,6 +19,9 @@ struct SceneOptions {
   SceneKind kind = SceneKind::kHybrid;
   Difficulty difficulty = Difficulty::kNormal;
   std::uint32_t seed = 0;
+  // Another visit to the seafloor that `seed`, `kind` and a survey's width make: the same ground in
+  // the same world, but other lamps, snow, fish, noise and another motion.
+  std::uint32_t visit = 0;
   int frames = 120;
   double rate = 3;   // [Hz]
   double width = 0;  // of a survey's spiral [m]; 0: what the frames cover at 0.055 m each
@@ -38,6 +41,9 @@ const std::map<std::string, Difficulty>& difficulties();
 
 // The options of a preset, with the kind's number of frames and rate.
 SceneOptions make_scene_options(SceneKind kind, Difficulty difficulty, std::uint32_t seed);
+
+// Seed of what is another one at each visit; of visit 0 it is `seed`.
+std::uint32_t visit_seed(const SceneOptions& options);
 
 // The cameras: f = 0.84 widths and a baseline of 0.15 m; a square fisheye of the stereo images'
 // width that sees 172 degrees.

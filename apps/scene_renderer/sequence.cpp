@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/scene_renderer/lamps.h"
 #include "apps/scene_renderer/noise.h"
 #include "apps/scene_renderer/relief.h"
 
@@ -27,16 +28,6 @@ ReliefOptions relief_options(const SceneOptions& options) {
   return relief;
 }
 
-Lamp make_lamp(const Rigid3d& world_from_body, const Vector3d& place, const Vector3d& towards,
-               float power, float beam) {
-  Lamp lamp;
-  lamp.position = (world_from_body * place).cast<float>();
-  lamp.axis = (world_from_body.rotation() * (towards - place).normalized()).cast<float>();
-  lamp.intensity = power * Color(1.0F, 0.97F, 0.88F);
-  lamp.beam = beam;
-  return lamp;
-}
-
 Rigid3d right_of(const Rigid3d& world_from_left, double baseline) {
   return {world_from_left.rotation(), world_from_left * Vector3d(baseline, 0, 0)};
 }
@@ -58,26 +49,19 @@ SceneSequence::SceneSequence(const SceneOptions& options, const SceneCameras& ca
 }
 
 std::uint32_t SceneSequence::seed_of(int frame, int view) const {
-  return mixed_bits(frame, view, 17, options_.seed);
+  return mixed_bits(frame, view, 17, visit_seed(options_));
 }
 
 Lighting SceneSequence::lighting_at(const RigMoment& moment) const {
   Lighting lighting;
   lighting.water = options_.water;
-  const Vector3d ahead(0.075, 0, 1.9);  // in the left camera's frame
-  lighting.lamps.push_back(make_lamp(moment.world_from_left, {-0.38, -0.2, -0.05}, ahead, 3.2F, 2));
-  lighting.lamps.push_back(make_lamp(moment.world_from_left, {0.53, -0.22, -0.05}, ahead, 2.6F, 2));
-  if (moment.world_from_fish) {
-    const Vector3d beside(0.02, -0.08, 0.01);
-    lighting.lamps.push_back(
-        make_lamp(*moment.world_from_fish, beside, beside + Vector3d(0, 0.05, 1), 0.35F, 0.9F));
-  }
+  lighting.lamps = lamps_at(options_, moment);
   if (moment.silt > 0) {
     SiltCloud cloud;
     cloud.centre = (*moment.world_from_fish * Vector3d(0, 0, 0.08)).cast<float>();
     cloud.extinction = 40 * moment.silt;
     cloud.radius = 0.26F;
-    cloud.seed = options_.seed + 3;
+    cloud.seed = visit_seed(options_) + 3;
     lighting.silt.push_back(cloud);
   }
   return lighting;
@@ -88,7 +72,8 @@ RadianceImage SceneSequence::expose(const SceneMoment& moment, const Camera& cam
                                     double time, int frame, int view) const {
   RadianceImage image = render_view(moment, rays, world_from_cam, seed_of(frame, view), threads_);
   if (options_.snow.density > 0) {
-    draw_snow(options_.snow, moment, camera, rays, world_from_cam, time, options_.seed, image);
+    draw_snow(options_.snow, moment, camera, rays, world_from_cam, time, visit_seed(options_),
+              image);
   }
   return image;
 }
@@ -97,7 +82,7 @@ RenderedFrame SceneSequence::render(int frame) const {
   const RigMoment& rig = motion_[static_cast<std::size_t>(frame)];
   std::unique_ptr<RayCaster> fish;
   if (options_.fish > 0) {
-    fish = std::make_unique<RayCaster>(make_fish(options_.fish, rig.time, options_.seed), 1);
+    fish = std::make_unique<RayCaster>(make_fish(options_.fish, rig.time, visit_seed(options_)), 1);
   }
   const SceneMoment moment{&seafloor_, fish.get(), lighting_at(rig)};
   const auto picture_of = [&](const RadianceImage& image, const ViewRays& rays, float exposure,

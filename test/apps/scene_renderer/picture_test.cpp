@@ -20,11 +20,6 @@ const SceneSequence& sequence_of(Difficulty difficulty) {
   return *sequence;
 }
 
-Camera left_camera(const SceneSequence& sequence) {
-  const auto& [fx, fy, cx, cy, baseline] = sequence.cameras().stereo.params;
-  return Calibrated<Pinhole>{{fx, fy, cx, cy}, kWidth, kHeight};
-}
-
 // Mean absolute difference of neighbouring grey values in the middle of the image.
 double contrast(const ColorImage& image) {
   const GrayImage grey = gray(image);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "apps/io/trajectory.h"
+#include "apps/scene_renderer/rig_motion.h"
 #include "cameras/calibration_file.h"
 #include "frontend/input/image_sequence.h"
 #include "test/support/child_process.h"
@@ -82,6 +84,43 @@ TEST_CASE("the readers read a survey") {
   CHECK(sequence->read(0).left.width == 96);
 }
 
+TEST_CASE("another visit is told, and its truth is in the same world as the first one's") {
+  const TempFolder folder;
+  const std::vector<std::string> survey{"--kind", "survey", "--width", "2", "--seed", "7"};
+  const auto with = [&](const std::string& out, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = small(out, survey);
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    REQUIRE(render(folder.path(), arguments).code == 0);
+  };
+  with("plain", {});
+  with("0", {"--visit", "0"});
+  with("1", {"--visit", "1"});
+  const auto first = content_of(folder.path() / "plain"), again = content_of(folder.path() / "1");
+  CHECK(first == content_of(folder.path() / "0"));
+  CHECK_FALSE(nlohmann::json::parse(first.at("stereo/scene.json")).contains("visit"));
+  CHECK(nlohmann::json::parse(again.at("stereo/scene.json"))["visit"] == 1);
+  for (const char* const image : {"stereo/images/0_0.jpg", "stereo/images/2_1.jpg"}) {
+    CHECK(first.at(image) != again.at(image));
+  }
+  for (const int visit : {0, 1}) {
+    SceneOptions options = make_scene_options(SceneKind::kSurvey, Difficulty::kNormal, 7);
+    options.visit = static_cast<std::uint32_t>(visit);
+    options.frames = 3;
+    options.width = 2;
+    const RayCaster none(make_icosphere(0, Material::kGround, 0), 1);
+    const auto motion = make_motion(options, none);
+    const auto truth =
+        read_trajectory(folder.path() / std::to_string(visit) / "stereo/gt_left_tum.txt").poses;
+    REQUIRE(truth.size() == 3);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Rigid3d& pose = motion[i].world_from_left;
+      const Eigen::Vector3d offset = truth[i].world_from_cam.translation() - pose.translation();
+      CHECK((offset - Eigen::Vector3d(4, 7, -3)).norm() < 1e-6);
+      CHECK(truth[i].world_from_cam.rotation().angularDistance(pose.rotation()) < 1e-6);
+    }
+  }
+}
+
 TEST_CASE("sequences share a folder if their cameras agree, and none is overwritten") {
   const TempFolder folder;
   const auto frame = [](const std::string& name, const std::string& size) {
@@ -113,6 +152,7 @@ TEST_CASE("bad command lines and folders end in one line") {
   refused({"a", "--kind", "survey", "--width", "nan"}, 2, "--width");
   refused({"a", "--width", "7"}, 2, "--width needs --kind survey");
   refused({"a", "--seed", "-1"}, 2, "--seed");
+  refused({"a", "--visit", "-1"}, 2, "--visit");
   refused({"a", "--threads", "0"}, 2, "--threads");
   refused({"a", "--sequence", "../b"}, 2, "\"../b\" is no name of a sequence");
   refused({"a", "--unknown"}, 2, "--unknown");

@@ -14,6 +14,12 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+Camera left_camera(const SceneSequence& sequence) {
+  const auto& stereo = sequence.cameras().stereo;
+  const auto& [fx, fy, cx, cy, baseline] = stereo.params;
+  return Calibrated<Pinhole>{{fx, fy, cx, cy}, stereo.width, stereo.height};
+}
+
 GrayImage gray(const ColorImage& image) {
   GrayImage result{image.width, image.height, {}};
   for (std::size_t i = 0; i < image.pixels.size(); i += 3) {

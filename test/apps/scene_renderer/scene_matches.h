@@ -8,6 +8,8 @@
 
 namespace hybrid_slam {
 
+Camera left_camera(const SceneSequence& sequence);
+
 GrayImage gray(const ColorImage& image);
 
 FeatureSet sift_of(const ColorImage& image, int features);
