@@ -3,8 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Eigenvalues>
-
 #include "cameras/geometry/se3.h"
 
 namespace hybrid_slam {
@@ -53,17 +51,6 @@ LinearizedBearings linearize(std::span<const BearingObservation> observations,
     result.cost += residual.squaredNorm();
   }
   return result;
-}
-
-// Whether the observations determine all six unknowns, whatever the units of each.
-bool is_determined(const Matrix6d& lower_information) {
-  constexpr double kMinConditioning = 1e-12;  // smallest / largest eigenvalue of the scaled system
-  Matrix6d scaled = lower_information.selfadjointView<Eigen::Lower>();
-  if (!(scaled.diagonal().minCoeff() > 0) || !scaled.allFinite()) return false;
-  const Vector6d scale = scaled.diagonal().cwiseSqrt().cwiseInverse();
-  scaled = scale.asDiagonal() * scaled * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues()[0] > kMinConditioning * eigen.eigenvalues()[5];
 }
 
 }  // namespace
@@ -119,7 +106,8 @@ std::optional<Rigid3d> refine_on_bearings(std::span<const BearingObservation> ob
       damping = damping > 0 ? damping * 10 : kFirstDamping;
     }
   }
-  if (!std::isfinite(at_pose.cost) || !is_determined(at_pose.equations.information)) {
+  if (!std::isfinite(at_pose.cost) ||
+      !is_determined(Matrix6d(at_pose.equations.information.selfadjointView<Eigen::Lower>()))) {
     return std::nullopt;
   }
   return pose;

@@ -34,13 +34,17 @@ struct BearingObservation {
 std::vector<BearingObservation> bearing_observations(const Camera& camera,
                                                      std::span<const PoseObservation> observations);
 
-// Squared residual at a pose. In the half space opposite to the bearing, where the residual falls
-// again, a bound of it instead.
+// Squared residual of a point in the camera's frame. In the half space opposite to the bearing,
+// where the residual falls again, a bound of it instead.
+inline double direction_chi2(const BearingObservation& seen, const Eigen::Vector3d& point_in_cam) {
+  if (!(seen.bearing.dot(point_in_cam) > 0)) return seen.whitening.squaredNorm();
+  return (seen.whitening * point_in_cam).squaredNorm() / point_in_cam.squaredNorm();
+}
+
+// The same of the observation's own point, at a pose.
 inline double bearing_chi2(const BearingObservation& observation, const Eigen::Matrix3d& rotation,
                            const Eigen::Vector3d& translation) {
-  const Eigen::Vector3d point = rotation * observation.point_in_world + translation;
-  if (!(observation.bearing.dot(point) > 0)) return observation.whitening.squaredNorm();
-  return (observation.whitening * point).squaredNorm() / point.squaredNorm();
+  return direction_chi2(observation, rotation * observation.point_in_world + translation);
 }
 
 // Sum of bearing_chi2.

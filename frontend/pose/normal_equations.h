@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 #include "cameras/geometry/rigid3d.h"
 
@@ -37,6 +38,18 @@ struct PoseNormalEquations {
     return step;
   }
 };
+
+// Whether a system (symmetric) determines all its unknowns, whatever the units of each.
+template <int N>
+bool is_determined(Eigen::Matrix<double, N, N> information) {
+  constexpr double kMinConditioning = 1e-12;  // smallest / largest eigenvalue of the scaled system
+  if (!(information.diagonal().minCoeff() > 0) || !information.allFinite()) return false;
+  const Eigen::Matrix<double, N, 1> scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  information = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> eigen(information,
+                                                                         Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues()[0] > kMinConditioning * eigen.eigenvalues()[N - 1];
+}
 
 // d residual / d pose (N x 6, left perturbation) from d residual / d point_in_cam (N x 3): a
 // perturbed pose moves the point by translation + rotation x point.

@@ -98,15 +98,6 @@ class MinimalSolver {
   opengv::absolute_pose::CentralAbsoluteAdapter adapter_;
 };
 
-// Iterations after which a sample of three inliers has been drawn with the wanted confidence.
-int needed_iterations(double inlier_share, const PnpRansacOptions& options) {
-  const double good_sample = std::pow(inlier_share, 3);
-  if (good_sample >= 1) return 1;
-  const double needed = std::log(1 - options.confidence) / std::log1p(-good_sample);
-  return needed < options.max_iterations ? static_cast<int>(std::ceil(needed))
-                                         : options.max_iterations;
-}
-
 // MLPnP on the inliers, which are chosen anew, as long as that lowers the cost. None if they leave
 // the pose open.
 std::optional<Consensus> refine(Observations observations, Consensus best) {
@@ -141,7 +132,7 @@ Consensus search(Observations observations, const PnpRansacOptions& options) {
       if (!refined || refined->cost >= best.cost) continue;
       best = std::move(*refined);
       const double inliers = static_cast<double>(best.inliers.size());
-      iterations = needed_iterations(inliers / count, options);
+      iterations = needed_samples(inliers / count, options.confidence, options.max_iterations);
     }
   }
   return best;

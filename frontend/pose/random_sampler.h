@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <random>
 
@@ -36,5 +37,14 @@ class RandomSampler {
  private:
   std::mt19937_64 engine_;
 };
+
+// Samples of three after which one of inliers alone has been drawn with this confidence, `most` of
+// them at most.
+inline int needed_samples(double inlier_share, double confidence, int most) {
+  const double good_sample = inlier_share * inlier_share * inlier_share;
+  if (good_sample >= 1) return 1;
+  const double needed = std::log(1 - confidence) / std::log1p(-good_sample);
+  return needed < most ? static_cast<int>(std::ceil(needed)) : most;
+}
 
 }  // namespace hybrid_slam
