@@ -115,36 +115,99 @@ bool sample_target(const Level& level, int half_size, const Eigen::Matrix2d& war
   return true;
 }
 
-// Solves target ~ shift_x * gradient_x + shift_y * gradient_y + gain * values; the inverse of the
-// normal matrix over the unknowns that are free.
-struct Solver {
-  explicit Solver(const ReferencePatch& patch, bool horizontal_only) {
-    Eigen::Matrix3d normal = patch.normal;
-    if (horizontal_only) {
-      normal.row(1).setZero();
-      normal.col(1).setZero();
-      normal(1, 1) = 1;
+// What a target says of the shift and the gain, its slopes and the veil's estimated along with
+// them: three numbers, each the scalar product of the target with a patch of weights.
+class Solver {
+ public:
+  Solver(const ReferencePatch& patch, bool horizontal_only) {
+    ReferencePatch::Normal normal = patch.normal;
+    if (horizontal_only) hold(ReferencePatch::kShiftY, &normal);
+    const ReferencePatch::Normal inverse = normal.inverse();
+    is_usable_ =
+        inverse.allFinite() && has_place(inverse, patch.columns[0].size(), horizontal_only);
+    if (!is_usable_) return;
+    for (std::size_t i = 0; i < weights_.size(); ++i) {
+      weights_[i].assign(patch.columns[0].size(), 0);
+      if (horizontal_only && i == ReferencePatch::kShiftY) continue;
+      for (std::size_t k = 0; k < patch.columns.size(); ++k) {
+        if (horizontal_only && k == ReferencePatch::kShiftY) continue;
+        const auto share =
+            static_cast<float>(inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)));
+        for (std::size_t p = 0; p < weights_[i].size(); ++p) {
+          weights_[i][p] += share * patch.columns[k][p];
+        }
+      }
     }
-    inverse = normal.inverse();
-    if (horizontal_only) inverse(1, 1) = 0;
   }
 
-  Eigen::Vector3d solve(const ReferencePatch& patch, const std::vector<float>& target) const {
-    return inverse * Eigen::Vector3d(dot(patch.gradient_x, target), dot(patch.gradient_y, target),
-                                     dot(patch.values, target));
+  bool is_usable() const { return is_usable_; }
+
+  // (shift_x, shift_y, gain).
+  Eigen::Vector3d solve(const std::vector<float>& target) const {
+    return {dot(weights_[0], target), dot(weights_[1], target), dot(weights_[2], target)};
   }
 
-  Eigen::Matrix3d inverse;
+ private:
+  static void hold(int column, ReferencePatch::Normal* normal) {
+    normal->row(column).setZero();
+    normal->col(column).setZero();
+    (*normal)(column, column) = 1;
+  }
+
+  // Whether enough texture is left beside gain, veil and their slopes.
+  static bool has_place(const ReferencePatch::Normal& inverse, std::size_t samples,
+                        bool horizontal_only) {
+    const double energy = kMinGradientEnergy * static_cast<double>(samples);
+    const double along_x = 1 / inverse(0, 0);
+    const double along_y = horizontal_only ? 0 : 1 / inverse(1, 1);
+    return along_x + along_y >= energy;
+  }
+
+  std::array<std::vector<float>, 3> weights_;
+  bool is_usable_ = false;
 };
 
 // How well the target's samples fit gain * values.
 void judge(const ReferencePatch& patch, const std::vector<float>& target, Alignment* result) {
   const double tt = dot(target, target);
-  const double rr = patch.normal(2, 2);
-  const double tr = dot(target, patch.values);
+  const double rr = patch.normal(ReferencePatch::kGain, ReferencePatch::kGain);
+  const double tr = dot(target, patch.columns[ReferencePatch::kGain]);
   result->correlation = tt > 0 ? tr / std::sqrt(tt * rr) : 0;
   const double squares = std::max(0.0, tt - tr * tr / rr);
   result->residual = std::sqrt(squares / static_cast<double>(target.size()));
+}
+
+// From samples with a rim of one pixel.
+void fill_columns(const std::vector<float>& samples, int side, ReferencePatch* patch) {
+  auto& columns = patch->columns;
+  for (auto& column : columns) column.reserve(static_cast<std::size_t>((side - 2) * (side - 2)));
+  for (int v = 1; v < side - 1; ++v) {
+    for (int u = 1; u < side - 1; ++u) {
+      const float* s = samples.data() + v * side + u;
+      columns[ReferencePatch::kShiftX].push_back(0.5F * (s[1] - s[-1]));
+      columns[ReferencePatch::kShiftY].push_back(0.5F * (s[side] - s[-side]));
+      columns[ReferencePatch::kGain].push_back(s[0]);
+    }
+  }
+  remove_mean(&columns[ReferencePatch::kGain]);
+  const int half = patch->half_size;
+  std::size_t i = 0;
+  for (int v = -half; v <= half; ++v) {
+    for (int u = -half; u <= half; ++u, ++i) {
+      const float value = columns[ReferencePatch::kGain][i];
+      columns[ReferencePatch::kGainX].push_back(value * static_cast<float>(u));
+      columns[ReferencePatch::kGainY].push_back(value * static_cast<float>(v));
+      columns[ReferencePatch::kVeilX].push_back(static_cast<float>(u));
+      columns[ReferencePatch::kVeilY].push_back(static_cast<float>(v));
+    }
+  }
+  for (auto& column : columns) remove_mean(&column);
+  for (int k = 0; k < ReferencePatch::kColumns; ++k) {
+    for (int j = 0; j <= k; ++j) {
+      patch->normal(k, j) = patch->normal(j, k) =
+          dot(columns[static_cast<std::size_t>(k)], columns[static_cast<std::size_t>(j)]);
+    }
+  }
 }
 
 }  // namespace
@@ -173,20 +236,8 @@ std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, do
   const int side = 2 * half + 3;  // one more all around for the derivatives
   std::vector<float> samples;
   sample_square(level, cx, cy, half + 1, &samples);
-  for (int v = 1; v < side - 1; ++v) {
-    for (int u = 1; u < side - 1; ++u) {
-      const float* s = samples.data() + v * side + u;
-      patch.values.push_back(s[0]);
-      patch.gradient_x.push_back(0.5F * (s[1] - s[-1]));
-      patch.gradient_y.push_back(0.5F * (s[side] - s[-side]));
-    }
-  }
-  for (auto* column : {&patch.values, &patch.gradient_x, &patch.gradient_y}) remove_mean(column);
-  const std::vector<float>* columns[] = {&patch.gradient_x, &patch.gradient_y, &patch.values};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) patch.normal(i, j) = dot(*columns[i], *columns[j]);
-  }
-  const double energy = kMinGradientEnergy * static_cast<double>(patch.values.size());
+  fill_columns(samples, side, &patch);
+  const double energy = kMinGradientEnergy * static_cast<double>(patch.columns[0].size());
   if (patch.normal(0, 0) + patch.normal(1, 1) < energy) return std::nullopt;
   return patch;
 }
@@ -207,13 +258,13 @@ Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
   const Eigen::Matrix2d warp = target_from_reference * std::ldexp(1.0, patch.level - level_index);
 
   const Solver solver(patch, options.horizontal_only);
-  if (!solver.inverse.allFinite()) return result;
+  if (!solver.is_usable()) return result;
   const Eigen::Vector2d first = start / pixel;
   Eigen::Vector2d centre = first;
   std::vector<float> samples;
   for (int i = 0; i < options.max_iterations; ++i) {
     if (!sample_target(level, patch.half_size, warp, centre, &samples)) return result;
-    const Eigen::Vector3d solution = solver.solve(patch, samples);
+    const Eigen::Vector3d solution = solver.solve(samples);
     const double gain = solution.z();
     if (!(gain > 1 / kMaxGainRatio && gain < kMaxGainRatio)) return result;
     // The patch shifted by `solution / gain` looks like the target: the target's place moves back.

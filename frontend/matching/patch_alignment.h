@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,12 +28,14 @@ struct AlignmentOptions {
 struct ReferencePatch {
   int level = 0;
   int half_size = 0;
-  // Row by row, each without its mean over the patch: grey values and their derivatives by a shift
-  // of the patch, per pixel of the level.
-  std::vector<float> values;
-  std::vector<float> gradient_x;
-  std::vector<float> gradient_y;
-  Eigen::Matrix3d normal;  // of (gradient_x, gradient_y, values)
+  // What the target's grey values are made of, each row by row and without its mean over the patch:
+  // the derivatives by a shift of the patch, per pixel of the level; the values themselves (gain);
+  // the values times x and times y (a gain that changes across the patch); x and y (a veil that
+  // does).
+  enum Column { kShiftX, kShiftY, kGain, kGainX, kGainY, kVeilX, kVeilY, kColumns };
+  using Normal = Eigen::Matrix<double, kColumns, kColumns>;
+  std::array<std::vector<float>, kColumns> columns;
+  Normal normal;  // of the columns
 };
 
 // The patch around (x, y) [px] in the pyramid level that fits a keypoint's scale [px]. None where
@@ -48,9 +51,11 @@ struct Alignment {
 };
 
 // Finds the place in `target` that looks like the patch: inverse compositional Lucas-Kanade (Baker
-// and Matthews 2004) over the position with gain and bias, which are linear and so part of every
-// step. `target_from_reference`: how offsets from the centre map between the images, fixed.
-// `start`: within about a pixel of the patch's level. Deterministic.
+// and Matthews 2004) over the position with gain and bias and their slopes, which are linear and so
+// part of every step. Lamps on the vehicle and the veil of scattered light move along with the
+// camera: without slopes they hold the patches back, and every motion comes out too short.
+// `target_from_reference`: how offsets from the centre map between the images, fixed. `start`:
+// within about a pixel of the patch's level. Deterministic.
 Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
                       const Eigen::Matrix2d& target_from_reference, const Eigen::Vector2d& start,
                       const AlignmentOptions& options);
