@@ -14,9 +14,10 @@ constexpr const char* kFooter = R"(Writes to DIR:
   stereo.tum         every tracked frame, final estimate (world_from_cam of the left camera)
   stereo_online.tum  the estimate at the moment each frame was tracked
   fisheye.tum, fisheye_online.tum   the same of the fisheye
-  map.hslam          the whole map, to go on with (docs/map_file.md)
+  map.hslam          the whole map, to go on with (docs/map_file.md); not with --localize
   map.ply, map.png   landmarks and keyframes; map and path from above and from the side
   timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
+  loops.csv          places that were proposed as loops, and what came of them
   summary.json       frames, keyframes, landmarks, options, and ATE where the dataset has truth
 
 Exit codes: 0 done; 1 internal error; 2 bad usage, or no such device; 3 bad input (dataset,
@@ -59,6 +60,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   std::string device = "auto";
   std::optional<int> features;
   std::optional<std::uint64_t> seed;
+  std::optional<bool> loops;
   const std::map<std::string, SequenceLayout> layouts{{"auto", SequenceLayout::kAuto},
                                                       {"kitti", SequenceLayout::kKitti},
                                                       {"euroc", SequenceLayout::kEuroc},
@@ -122,12 +124,26 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
                  "write map.hslam on the way, every so many keyframes")
       ->check(CLI::Range(1, 1000000).description(""));
   app.add_option("--vocabulary", line.vocabulary,
-                 "file of a vocabulary of RootSIFT, to find lost frames with (default: built in)");
+                 "file of a vocabulary of RootSIFT, to recognise places with (default: built in)");
+  app.add_option("--loops", loops,
+                 "on (default) or off: recognise places seen before and correct the map")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"on", true}, {"off", false}})
+                      .description(""))
+      ->option_text("on|off");
+  app.add_option("--map", line.map, "map file (map.hslam) to go on with")->option_text("FILE");
+  app.add_flag("--localize", line.localize, "track in the map of --map without changing it");
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
   try {
     app.parse(argc, argv);
     if (line.rate > 0 && line.mode != RunMode::kRealtime) {
       throw CLI::ValidationError("--rate needs --mode realtime");
+    }
+    if (line.localize && line.map.empty()) {
+      throw CLI::ValidationError("--localize needs --map");
+    }
+    if (line.localize && line.checkpoint_every > 0) {
+      throw CLI::ValidationError(
+          "--localize changes no map: nothing for --checkpoint-every to save");
     }
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // --help
@@ -143,6 +159,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   }
   line.options.features = features.value_or(line.options.features);
   line.options.seed = seed.value_or(line.options.seed);
+  line.options.loops.enabled = loops.value_or(line.options.loops.enabled);
   line.options.distribute();
   const auto chosen_device = choose_device(device, line.options.sift);
   if (!chosen_device) {

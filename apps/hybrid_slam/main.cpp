@@ -9,6 +9,7 @@
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/io/progress_line.h"
 #include "apps/pipeline/interrupt.h"
+#include "backend/map/map_file.h"
 #include "backend/problem/solver_log.h"
 #include "cameras/input_error.h"
 #include "cameras/output_file.h"
@@ -35,8 +36,23 @@ std::string checkpoint(const CommandLine& line, const MapSnapshot& map) {
   return {};
 }
 
+// The map to go on with; an empty one for a new map.
+Map starting_map(const CommandLine& line) {
+  if (line.map.empty()) return {};
+  Map map = load_map(line.map).map;
+  const MapSnapshot& view = map.view();
+  if (!view.origin().valid()) throw InputError(line.map + ": the map holds no keyframe");
+  const DescriptorKind kind = view.at(view.origin()).observations->features.kind;
+  if (kind != DescriptorKind::kRootSift) {
+    throw InputError(fmt::format("{}: the map's descriptors are {}, those of the images are {}",
+                                 line.map, kind_name(kind), kind_name(DescriptorKind::kRootSift)));
+  }
+  return map;
+}
+
 int run(const CommandLine& line, const Interrupt& interrupt) {
   RunOptions options;
+  Map map = starting_map(line);
   if (!line.vocabulary.empty()) {
     options.vocabulary = load_vocabulary(line.vocabulary, DescriptorKind::kRootSift);
   }
@@ -63,17 +79,19 @@ int run(const CommandLine& line, const Interrupt& interrupt) {
     spdlog::warn(text);
   };
   hooks.cancelled = interrupt.token();
-  hooks.checkpoint = [&](const MapSnapshot& map) { return checkpoint(line, map); };
+  hooks.checkpoint = [&](const MapSnapshot& so_far) { return checkpoint(line, so_far); };
   options.threads = line.threads;
   options.limit = line.limit;
   options.rate = line.rate;
   options.checkpoint_every = line.checkpoint_every;
+  options.localize = line.localize;
 
   const ImageFrameSource source(*sequence, line.options, line.device);
   const auto start = std::chrono::steady_clock::now();
-  const RunResult result = line.mode == RunMode::kRealtime
-                               ? run_realtime(source, line.options, options, hooks)
-                               : run_every_frame(source, line.options, options, hooks);
+  const RunResult result =
+      line.mode == RunMode::kRealtime
+          ? run_realtime(source, line.options, options, hooks, std::move(map))
+          : run_every_frame(source, line.options, options, hooks, std::move(map));
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   progress.finish();
   const RunSummary summary = write_outputs(line, sequence->info(), result, elapsed.count());
@@ -87,7 +105,10 @@ int run(const CommandLine& line, const Interrupt& interrupt) {
     return kExitInterrupted;
   }
   if (result.frames.tracked == 0) {
-    spdlog::error("no frame could be tracked: too few features or stereo matches to start a map");
+    spdlog::error(
+        line.map.empty()
+            ? "no frame could be tracked: too few features or stereo matches to start a map"
+            : "no frame could be found in the map of " + line.map);
     return kExitNothingTracked;
   }
   return kExitOk;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "apps/hybrid_slam/loop_outputs.h"
 #include "apps/hybrid_slam/version.h"
 #include "apps/io/map_picture.h"
 #include "apps/io/ply.h"
@@ -117,6 +118,9 @@ Json options_json(const CommandLine& line, bool hybrid) {
           {"threads", line.threads},
           {"rate", line.rate},
           {"limit", line.limit},
+          {"loops", options.loops.enabled},
+          {"map", line.map.empty() ? Json() : Json(line.map)},
+          {"localize", line.localize},
           {"contrast_threshold", options.sift.contrast_threshold},
           {"upsample", options.sift.upsample},
           {"refine_stereo", options.stereo.refine},
@@ -157,6 +161,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
       result.records, [](const TrackedFrame& frame) { return to_string(frame.prediction); });
   json["keyframes"] = result.map->keyframe_count();
   json["landmarks"] = result.map->landmark_count();
+  json["loops"] = to_json(result.loops);
   if (sequence.fisheye) json["fisheye"] = fisheye_json(result, summary);
   json["disparity_offset_px"] =
       result.records.empty() ? 0 : result.records.back().frame.disparity_offset;
@@ -200,9 +205,12 @@ RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
   write_map_ply(out / "map.ply", *result.map);
   write_map_picture(out / "map.png", make_picture(sequence, result, stereo.final_estimate,
                                                   fisheye.final_estimate, summary.ate));
+  write_loops(out / "loops.csv", result.loops);
   write_json(out / "timing.json", to_json(result.times));
   write_json(out / "summary.json", summary_json(line, sequence, result, summary));
-  write_map(line, *result.map);  // the largest: where the disk gets full, the others are there
+  if (!line.localize) {
+    write_map(line, *result.map);  // the largest: where the disk gets full, the others are there
+  }
   return summary;
 }
 
@@ -217,6 +225,11 @@ void print_summary(const CommandLine& line, const RunResult& result, const RunSu
   }
   fmt::print("map        {} keyframes, {} landmarks\n", result.map->keyframe_count(),
              result.map->landmark_count());
+  if (!result.loops.empty()) {
+    const Json loops = to_json(result.loops);
+    fmt::print("loops      {} places proposed, {} closed\n", loops["proposed"].get<int>(),
+               loops["accepted"].get<int>());
+  }
   fmt::print("time       {:.1f} s, {:.2f} frames per second\n", summary.seconds,
              summary.seconds > 0 ? frames.read / summary.seconds : 0);
   if (summary.ate) {

@@ -4,20 +4,36 @@
 namespace hybrid_slam {
 
 RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
-                          const RunOptions& run, const RunHooks& hooks) {
+                          const RunOptions& run, const RunHooks& hooks, Map map) {
   RunResult result;
   const std::size_t total = run.frames_of(source.size());
   Recorder recorder(result, hooks, total);
-  LocalMapping mapping(options);
-  FrameTracking tracking(source, options, run.vocabulary, mapping, recorder, result.times);
+  LocalMapping mapping(options, std::move(map));
+  FrameTracking tracking(source, options, run, mapping, recorder, result.times);
   CheckpointSchedule checkpoints(run.checkpoint_every);
+  std::optional<LoopClosing> loops;
+  if (options.loops.enabled && !run.localize) {
+    loops.emplace(run.vocabulary, options.loops.finder);
+  }
   const auto publish = [&] { result.map = mapping.snapshot(); };
+  const auto close_loop = [&](KeyframeId id) {
+    const auto loop = loops ? loops->find(*result.map, id, result.times) : std::nullopt;
+    if (!loop) {
+      return;
+    }
+    const LoopOutcome outcome = mapping.close(*loop, result.times, publish);
+    loops->closed(outcome);
+    if (outcome.end == LoopEnd::kClosed) {
+      mapping.adjust_full(result.times, publish);
+    }
+  };
   const auto add_keyframe = [&](const std::optional<MappingJob>& job) {
     if (!job) {
       return;
     }
-    recorder.became_keyframe(job->camera, job->frame_index(),
-                             mapping.process(*job, result.times, {}, publish));
+    const KeyframeId id = mapping.process(*job, result.times, {}, publish);
+    recorder.became_keyframe(job->camera, job->frame_index(), id);
+    close_loop(id);
     if (checkpoints.due()) {
       recorder.failed(save_checkpoint(hooks.checkpoint, *result.map, result.times));
     }
@@ -32,6 +48,9 @@ RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
   loader.stop();
   loader.join();
   result.times.merge(loader.times());
+  if (loops) {
+    result.loops = loops->records();
+  }
   return result;
 }
 

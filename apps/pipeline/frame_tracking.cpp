@@ -1,18 +1,33 @@
 #include "apps/pipeline/frame_tracking.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace hybrid_slam {
 
+namespace {
+
+std::int64_t next_frame_index(const MapSnapshot& map) {
+  std::int64_t next = 0;
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    next = std::max(next, map.newest_frame_index(CameraId(i)) + 1);
+  }
+  return next;
+}
+
+}  // namespace
+
 FrameTracking::FrameTracking(const FrameSource& source, const SlamOptions& options,
-                             const Vocabulary& vocabulary, LocalMapping& mapping,
-                             Recorder& recorder, StageTimes& times)
-    : places_(std::make_shared<KeyframeDatabase>(vocabulary)),
-      stereo_(mapping.add_camera(source.camera()), source.camera(), options.tracking, places_),
+                             const RunOptions& run, LocalMapping& mapping, Recorder& recorder,
+                             StageTimes& times)
+    : places_(std::make_shared<KeyframeDatabase>(run.vocabulary)),
+      stereo_(mapping.camera_id(source.camera()), source.camera(), options.tracking, places_),
       recorder_(recorder),
-      times_(times) {
+      times_(times),
+      localize_(run.localize),
+      first_index_(next_frame_index(mapping.map().view())) {
   if (source.fisheye() != nullptr) {
-    fisheye_.emplace(mapping.add_camera(*source.fisheye()), *source.fisheye(),
+    fisheye_.emplace(mapping.camera_id(*source.fisheye()), *source.fisheye(),
                      options.fisheye.tracking, places_);
   }
 }
@@ -36,7 +51,8 @@ std::optional<MappingJob> FrameTracking::track(Frame stereo, const MapSnapshot& 
                                                bool allow_keyframe) {
   StageClock clock(times_);
   places_->follow(map);
-  TrackedFrame tracked = stereo_.track(std::move(stereo), map, allow_keyframe);
+  stereo.index += first_index_;
+  TrackedFrame tracked = stereo_.track(std::move(stereo), map, allow_keyframe && !localize_);
   clock.lap("track");
   stereo_reference_ = tracked.reference;
   return finish(CameraKind::kStereo, std::move(tracked), map);
@@ -52,8 +68,9 @@ std::optional<MappingJob> FrameTracking::track_fisheye(FrameSet frames, const Ma
   }
   StageClock clock(times_);
   places_->follow(map);
-  TrackedFrame tracked =
-      fisheye_->track(std::move(*frames.fisheye), map, stereo_reference_, allow_keyframe);
+  frames.fisheye->index += first_index_;
+  TrackedFrame tracked = fisheye_->track(std::move(*frames.fisheye), map, stereo_reference_,
+                                         allow_keyframe && !localize_);
   clock.lap("track_fisheye");
   return finish(CameraKind::kFisheye, std::move(tracked), map);
 }

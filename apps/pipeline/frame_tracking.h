@@ -16,8 +16,8 @@ namespace hybrid_slam {
 // gathers what the next keyframe takes along. One thread.
 class FrameTracking {
  public:
-  // Adds the source's cameras to the map.
-  FrameTracking(const FrameSource& source, const SlamOptions& options, const Vocabulary& vocabulary,
+  // Adds the source's cameras to the map, if it does not have them yet.
+  FrameTracking(const FrameSource& source, const SlamOptions& options, const RunOptions& run,
                 LocalMapping& mapping, Recorder& recorder, StageTimes& times);
 
   // Waits for the next frames that could be read. None at the end, or when the run is cancelled.
@@ -39,6 +39,8 @@ class FrameTracking {
   std::optional<FisheyeTracker> fisheye_;
   Recorder& recorder_;
   StageTimes& times_;
+  bool localize_;                // no frame becomes a keyframe
+  std::int64_t first_index_;     // of this run's frames in the map, after those of runs before
   KeyframeId stereo_reference_;  // of the last stereo frame; invalid if that was lost
   MapEdit counts_;               // since the last keyframe
 };

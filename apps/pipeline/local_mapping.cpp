@@ -12,8 +12,16 @@ void append_counts(const MapEdit& counts, MapEdit& waiting) {
   waiting.found.insert(waiting.found.end(), counts.found.begin(), counts.found.end());
 }
 
-LocalMapping::LocalMapping(const SlamOptions& options)
-    : options_(options), backend_(options.backend), probation_(options.culling) {}
+LocalMapping::LocalMapping(const SlamOptions& options, Map map)
+    : options_(options), backend_(options.backend, std::move(map)), probation_(options.culling) {}
+
+CameraId LocalMapping::camera_id(const Camera& camera) {
+  const MapSnapshot& map = backend_.view();
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    if (map.camera(CameraId(i)) == camera) return CameraId(i);
+  }
+  return backend_.add_camera(camera);
+}
 
 KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::stop_token stop,
                                  const std::function<void()>& publish) {
@@ -33,6 +41,35 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   clock.lap("cull_keyframes");
   publish();
   return id;
+}
+
+LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
+                                const std::function<void()>& publish) {
+  StageClock clock(times);
+  const LoopOutcome outcome = backend_.close(loop);
+  clock.lap("close_loop");
+  if (outcome.end != LoopEnd::kClosed) return outcome;
+  backend_.optimize_local(loop.keyframe);
+  clock.lap("local_bundle");
+  backend_.apply(fuse_places(backend_.view(), loop.keyframe, loop.match, options_.fusion));
+  clock.lap("fuse");
+  publish();
+  return outcome;
+}
+
+void LocalMapping::take_in_full(BundleResult result, StageTimes& times,
+                                const std::function<void()>& publish) {
+  StageClock clock(times);
+  backend_.take_in_full(std::move(result));
+  clock.lap("take_in_full_bundle");
+  publish();
+}
+
+void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& publish) {
+  StageClock clock(times);
+  BundleResult result = solve_full(backend_.view(), options_.backend.full);
+  clock.lap("full_bundle");
+  take_in_full(std::move(result), times, publish);
 }
 
 }  // namespace hybrid_slam

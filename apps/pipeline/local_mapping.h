@@ -28,14 +28,27 @@ void append_counts(const MapEdit& counts, MapEdit& waiting);
 // optimises. Owns the map. Synchronous; one thread at a time.
 class LocalMapping {
  public:
-  explicit LocalMapping(const SlamOptions& options);
+  // Goes on with `map`, if that is not empty.
+  explicit LocalMapping(const SlamOptions& options, Map map = {});
 
-  CameraId add_camera(const Camera& camera) { return backend_.add_camera(camera); }
+  // The map's camera of these numbers, or a new one.
+  CameraId camera_id(const Camera& camera);
 
   // `publish` is called whenever the map is worth looking at: once it holds the keyframe, and at
   // the end. `stop` cuts the bundle adjustment short.
   KeyframeId process(const MappingJob& job, StageTimes& times, std::stop_token stop,
                      const std::function<void()>& publish);
+
+  // Closes a verified loop: moves the map, joins the two sides and looks for more that they have in
+  // common. `publish` is called if it was closed.
+  LoopOutcome close(const LoopMeasurement& loop, StageTimes& times,
+                    const std::function<void()>& publish);
+
+  // Takes in what solve_full() made of a snapshot that no loop was closed since.
+  void take_in_full(BundleResult result, StageTimes& times, const std::function<void()>& publish);
+
+  // The same at once.
+  void adjust_full(StageTimes& times, const std::function<void()>& publish);
 
   std::shared_ptr<const MapSnapshot> snapshot() { return backend_.snapshot(); }
   const Map& map() const { return backend_.map(); }

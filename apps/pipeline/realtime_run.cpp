@@ -1,109 +1,127 @@
-#include <exception>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <stop_token>
-#include <thread>
 #include <utility>
 
-#include "apps/pipeline/channel.h"
 #include "apps/pipeline/checkpoint_worker.h"
 #include "apps/pipeline/frame_tracking.h"
+#include "apps/pipeline/full_bundle_worker.h"
+#include "apps/pipeline/loop_worker.h"
+#include "apps/pipeline/mapping_worker.h"
 #include "apps/pipeline/paced_camera.h"
 
 namespace hybrid_slam {
 namespace {
 
-constexpr std::size_t kMappingBacklog = 3;  // keyframes waiting for local mapping
-
-// Local mapping in its own thread. Keyframes go in, snapshots come out.
-class MappingWorker {
+// The threads behind tracking: mapping, the search for loops, full bundle adjustment, checkpoints.
+class Workers {
  public:
-  MappingWorker(LocalMapping& mapping, CheckpointWorker& checkpoints)
-      : mapping_(mapping), checkpoints_(checkpoints), jobs_(kMappingBacklog) {
-    snapshots_.publish(mapping_.snapshot());
-    thread_ = std::jthread([this] { work(); });
-  }
-
-  ~MappingWorker() { finish(); }
-
-  bool has_room() const { return jobs_.size() < kMappingBacklog; }
-
-  // False if the worker has failed: see rethrow().
-  bool add(MappingJob job) { return jobs_.push(std::move(job)); }
-
-  // Where time presses, a keyframe is worth more than the last iterations of the one before: its
-  // adjustment is cut short. Before the new one is added, so that it cannot be the one that is
-  // stopped.
-  void hurry() {
-    const std::lock_guard lock(mutex_);
-    current_.request_stop();
-  }
-
-  // Until the worker has begun with the last keyframe it was given.
-  void wait_until_taken() { jobs_.wait_empty(); }
-
-  std::shared_ptr<const MapSnapshot> snapshot() const { return snapshots_.get(); }
-
-  // Until the map has begun, there is nothing to track against.
-  void wait_for_map(std::size_t version) const { snapshots_.next(version); }
-  std::size_t version() const { return snapshots_.version(); }
-
-  // What is queued is still mapped.
-  void finish() {
-    jobs_.close();
-    if (thread_.joinable()) {
-      thread_.join();
+  Workers(LocalMapping& mapping, const SlamOptions& options, const RunOptions& run,
+          const SaveMap& checkpoint)
+      : local_mapping_(mapping),
+        checkpoints_(checkpoint, run.checkpoint_every),
+        mapping_(mapping, events()) {
+    if (options.loops.enabled && !run.localize) {
+      loop_closing_.emplace(run.vocabulary, options.loops.finder);
+      loops_.emplace(*loop_closing_, mapping_);
+      full_bundle_.emplace(options.backend.full, mapping_);
     }
   }
+  ~Workers() { join(true); }
 
-  // After finish(): what the thread threw, if it did.
-  void rethrow() const {
-    if (failure_) {
-      std::rethrow_exception(failure_);
+  MappingWorker& mapping() { return mapping_; }
+  CheckpointWorker& checkpoints() { return checkpoints_; }
+
+  // Joins the threads, then does in order what they left. `cancelled`: as little as possible.
+  void finish(bool cancelled, Recorder& recorder) {
+    join(cancelled);
+    mapping_.rethrow();
+    for (const auto& [kind, frame, id] : mapping_.keyframes()) {
+      recorder.became_keyframe(kind, frame, id);
+    }
+    if (loops_) {
+      recorder.failed(failure(loops_->failure()));
+      recorder.failed(failure(full_bundle_->failure()));
+      if (!cancelled) {
+        close_left_loops();
+      }
     }
   }
 
   // After finish().
-  const StageTimes& times() const { return times_; }
-  struct Added {
-    CameraKind camera;
-    std::int64_t frame_index;
-    KeyframeId id;
-  };
-  const std::vector<Added>& keyframes() const { return keyframes_; }
-
- private:
-  void work() {
-    const auto publish = [this] { snapshots_.publish(mapping_.snapshot()); };
-    try {
-      while (auto job = jobs_.pop()) {
-        std::stop_source stop;
-        {
-          const std::lock_guard lock(mutex_);
-          current_ = stop;
-        }
-        const KeyframeId id = mapping_.process(*job, times_, stop.get_token(), publish);
-        keyframes_.push_back({job->camera, job->frame_index(), id});
-        checkpoints_.keyframe_added(snapshots_.get());
-      }
-    } catch (...) {
-      failure_ = std::current_exception();
-      jobs_.close();
+  void write_to(RunResult& result) const {
+    result.times.merge(mapping_.times());
+    if (loops_) {
+      result.times.merge(loops_->times());
+      result.times.merge(full_bundle_->times());
+      result.loops = loop_closing_->records();
     }
-    snapshots_.close();
+    result.times.merge(checkpoints_.times());
+    result.times.merge(times_);
   }
 
-  LocalMapping& mapping_;
-  CheckpointWorker& checkpoints_;
-  Channel<MappingJob> jobs_;
-  Latest<MapSnapshot> snapshots_;
-  std::mutex mutex_;
-  std::stop_source current_;      // guarded by mutex_
-  StageTimes times_;              // the thread's own until finish()
-  std::vector<Added> keyframes_;  // likewise
-  std::exception_ptr failure_;    // likewise
-  std::jthread thread_;
+ private:
+  // Mapping first: the others learn that it takes nothing any more, and it tells them nothing.
+  void join(bool give_up) {
+    mapping_.finish();
+    if (loops_) {
+      loops_->finish();
+      full_bundle_->finish(give_up);
+    }
+    checkpoints_.finish();
+  }
+
+  MappingEvents events() {
+    MappingEvents events;
+    events.mapped = [this](KeyframeId id, const std::shared_ptr<const MapSnapshot>& map) {
+      checkpoints_.keyframe_added(map);
+      if (loops_) {
+        loops_->keyframe_mapped(id);
+      }
+    };
+    events.looped = [this](const LoopOutcome& outcome,
+                           const std::shared_ptr<const MapSnapshot>& map, int loops_closed) {
+      loops_->loop_handled(outcome);
+      if (outcome.end == LoopEnd::kClosed) {
+        full_bundle_->adjust(map, loops_closed);
+      }
+    };
+    return events;
+  }
+
+  static std::optional<RunFailure> failure(const std::string& text) {
+    return text.empty() ? std::nullopt : std::optional(RunFailure{text, true});
+  }
+
+  void close_left_loops() {
+    int closed = mapping_.loops_closed();
+    const auto close = [&](const LoopMeasurement& loop) {
+      const LoopOutcome outcome = local_mapping_.close(loop, times_, [] {});
+      loop_closing_->closed(outcome);
+      closed += outcome.end == LoopEnd::kClosed ? 1 : 0;
+    };
+    if (const auto loop = loops_->take_loop()) {
+      close(*loop);
+    }
+    for (const KeyframeId id : loops_->take_keyframes()) {
+      if (const auto loop = loop_closing_->find(*local_mapping_.snapshot(), id, times_)) {
+        close(*loop);
+      }
+    }
+    auto correction = full_bundle_->take_correction();
+    if (correction && correction->loops_closed == closed) {
+      local_mapping_.take_in_full(std::move(correction->result), times_, [] {});
+    } else if (closed > mapping_.loops_adjusted()) {
+      local_mapping_.adjust_full(times_, [] {});
+    }
+  }
+
+  LocalMapping& local_mapping_;
+  CheckpointWorker checkpoints_;
+  std::optional<LoopClosing> loop_closing_;
+  MappingWorker mapping_;
+  std::optional<LoopWorker> loops_;
+  std::optional<FullBundleWorker> full_bundle_;
+  StageTimes times_;  // of what was left
 };
 
 void report_failures(CheckpointWorker& checkpoints, Recorder& recorder) {
@@ -133,12 +151,13 @@ bool add_keyframe(std::optional<MappingJob> job, MappingWorker& mapping, bool pa
 }
 
 // Tracks in the calling thread until the images end or the run is cancelled. Images that come at
-// their own pace press for time; others wait for tracking, which waits for mapping, so that it is
-// never more than one keyframe of each camera ahead.
-void track_all(OrderedLoader& loader, FrameTracking& tracking, MappingWorker& mapping,
-               CheckpointWorker& checkpoints, bool paced, Recorder& recorder) {
+// their own pace press for time: tracking waits for nobody. Others wait for tracking, which waits
+// for mapping, so that it is never more than one keyframe of each camera ahead.
+void track_all(OrderedLoader& loader, FrameTracking& tracking, Workers& workers, bool paced,
+               Recorder& recorder) {
+  MappingWorker& mapping = workers.mapping();
   while (auto frames = tracking.next(loader)) {
-    report_failures(checkpoints, recorder);
+    report_failures(workers.checkpoints(), recorder);
     if (!paced) {
       mapping.wait_until_taken();
     }
@@ -156,14 +175,13 @@ void track_all(OrderedLoader& loader, FrameTracking& tracking, MappingWorker& ma
 }  // namespace
 
 RunResult run_realtime(const FrameSource& source, const SlamOptions& options, const RunOptions& run,
-                       const RunHooks& hooks) {
+                       const RunHooks& hooks, Map map) {
   RunResult result;
   const std::size_t total = run.frames_of(source.size());
   Recorder recorder(result, hooks, total);
-  LocalMapping local_mapping(options);
-  FrameTracking tracking(source, options, run.vocabulary, local_mapping, recorder, result.times);
-  CheckpointWorker checkpoints(hooks.checkpoint, run.checkpoint_every);
-  MappingWorker mapping(local_mapping, checkpoints);
+  LocalMapping local_mapping(options, std::move(map));
+  FrameTracking tracking(source, options, run, local_mapping, recorder, result.times);
+  Workers workers(local_mapping, options, run, hooks.checkpoint);
   std::optional<PacedCamera> camera;
   if (run.rate > 0) {
     camera.emplace(total, run.rate, hooks.cancelled);
@@ -171,7 +189,7 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
   OrderedLoader loader(source, run.threads,
                        camera ? [&] { return camera->next(); } : indices_below(total));
   try {
-    track_all(loader, tracking, mapping, checkpoints, camera.has_value(), recorder);
+    track_all(loader, tracking, workers, camera.has_value(), recorder);
   } catch (...) {
     if (camera) {
       camera->finish();  // a loader may be waiting for it
@@ -183,16 +201,10 @@ RunResult run_realtime(const FrameSource& source, const SlamOptions& options, co
   }
   loader.stop();
   loader.join();
-  mapping.finish();
-  mapping.rethrow();
-  checkpoints.finish();
-  report_failures(checkpoints, recorder);
-  for (const auto& [kind, frame, id] : mapping.keyframes()) {
-    recorder.became_keyframe(kind, frame, id);
-  }
+  workers.finish(recorder.cancelled(), recorder);
+  report_failures(workers.checkpoints(), recorder);
   result.times.merge(loader.times());
-  result.times.merge(mapping.times());
-  result.times.merge(checkpoints.times());
+  workers.write_to(result);
   result.map = local_mapping.snapshot();
   return result;
 }

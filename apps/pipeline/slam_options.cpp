@@ -296,7 +296,7 @@ std::string SlamOptions::validate() const {
   for (const std::string& error :
        {sift.validate(), stereo.validate(), tracking.validate(), fisheye.view.validate(),
         fisheye.tracking.validate(), triangulation.validate(), fusion.validate(),
-        culling.validate(), backend.incremental.validate()}) {
+        culling.validate(), backend.validate()}) {
     if (!error.empty()) {
       return error;
     }

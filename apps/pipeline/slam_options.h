@@ -10,6 +10,7 @@
 #include "frontend/mapping/fusion.h"
 #include "frontend/mapping/triangulation.h"
 #include "frontend/matching/stereo_matcher.h"
+#include "frontend/place_recognition/loop_finder.h"
 #include "frontend/tracking/fisheye_tracker.h"
 #include "frontend/tracking/stereo_tracker.h"
 
@@ -20,6 +21,12 @@ struct FisheyeOptions {
   bool upsample = true;  // as of SIFT; the rest of its options holds for all cameras
   FisheyeViewOptions view;
   FisheyeTrackerOptions tracking;
+};
+
+// Loop closing.
+struct LoopOptions {
+  bool enabled = true;
+  LoopFinderOptions finder;
 };
 
 // Everything that can be set, in one value. Read from YAML at the border only.
@@ -33,6 +40,7 @@ struct SlamOptions {
   TriangulationOptions triangulation;
   FusionOptions fusion;
   CullingOptions culling;
+  LoopOptions loops;
   BackendOptions backend;
 
   // Hands `features` and `seed` down to the parts that use them.

@@ -11,6 +11,7 @@
 
 #include "apps/io/stage_times.h"
 #include "apps/pipeline/frame_source.h"
+#include "apps/pipeline/loop_closing.h"
 #include "apps/pipeline/slam_options.h"
 #include "frontend/place_recognition/default_vocabulary.h"
 #include "frontend/tracking/stereo_tracker.h"
@@ -23,7 +24,8 @@ struct RunOptions {
   // Realtime: images per second, dropped when the pipeline is behind; 0: they wait for it.
   double rate = 0;
   int checkpoint_every = 0;  // keyframes: so often the map is saved on the way; 0: never
-  Vocabulary vocabulary = default_vocabulary();  // that lost frames are looked for with
+  Vocabulary vocabulary = default_vocabulary();  // that places are recognised with
+  bool localize = false;                         // track in the given map without changing it
 
   // How many frames are processed of those that there are.
   std::size_t frames_of(std::size_t available) const {
@@ -82,6 +84,7 @@ struct RunResult {
   FrameCounts fisheye_frames;        // of those that came with a stereo frame that could be read
   std::vector<FrameRecord> fisheye_records;
   std::shared_ptr<const MapSnapshot> map;
+  std::vector<LoopRecord> loops;  // places proposed, in the order in which they were looked at
   StageTimes times;
   bool cancelled = false;
   std::vector<std::string> internal_errors;  // that did not end the run; each was a warning, too
@@ -90,13 +93,15 @@ struct RunResult {
   Rigid3d cam_from_world(const FrameRecord& record) const;
 };
 
-// Every frame is tracked and mapped before the next one. Same input, options and seed give the same
-// result, bit for bit.
+// Every frame is tracked and mapped before the next one, loops closed and everything adjusted
+// before that. Same input, options and seed give the same result, bit for bit. Goes on with `map`,
+// if that is not empty.
 RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
-                          const RunOptions& run, const RunHooks& hooks);
+                          const RunOptions& run, const RunHooks& hooks, Map map = {});
 
-// Reading, tracking and local mapping in their own threads, joined at the end.
+// Reading, tracking, local mapping, the search for loops and full bundle adjustment in their own
+// threads, joined at the end.
 RunResult run_realtime(const FrameSource& source, const SlamOptions& options, const RunOptions& run,
-                       const RunHooks& hooks);
+                       const RunHooks& hooks, Map map = {});
 
 }  // namespace hybrid_slam

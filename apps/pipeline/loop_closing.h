@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/io/stage_times.h"
+#include "backend/backend.h"
+#include "frontend/place_recognition/loop_finder.h"
+
+namespace hybrid_slam {
+
+// A place that was proposed as a loop, and what came of it.
+struct LoopRecord {
+  KeyframeId keyframe;
+  KeyframeId match;
+  double time = 0;                // [s] of the keyframe's frame
+  double match_time = 0;          // [s]
+  std::string outcome;            // kLoopAccepted, or the reason why it was rejected
+  LoopVerification verification;  // without the loop
+  double translation = 0;         // by which the map was off [m], if that was looked at
+  double rotation = 0;            // [rad]
+};
+
+inline constexpr const char* kLoopAccepted = "accepted";
+
+// What happens for the loops of each new keyframe, but for what the map's owner does; and the books
+// of it. Synchronous; one thread at a time.
+class LoopClosing {
+ public:
+  LoopClosing(const Vocabulary& vocabulary, const LoopFinderOptions& options)
+      : finder_(vocabulary, options) {}
+
+  // A verified loop of this keyframe, to be closed by the map's owner, which then says what came
+  // of it.
+  std::optional<LoopMeasurement> find(const MapSnapshot& map, KeyframeId keyframe,
+                                      StageTimes& times);
+  void closed(const LoopOutcome& outcome);
+
+  const std::vector<LoopRecord>& records() const { return records_; }
+
+ private:
+  LoopFinder finder_;
+  std::vector<LoopRecord> records_;
+};
+
+}  // namespace hybrid_slam

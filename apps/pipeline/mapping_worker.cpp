@@ -1,0 +1,70 @@
+#include "apps/pipeline/mapping_worker.h"
+
+#include <utility>
+
+namespace hybrid_slam {
+
+MappingWorker::MappingWorker(LocalMapping& mapping, MappingEvents events)
+    : mapping_(mapping), events_(std::move(events)), tasks_(kKeyframeBacklog + kOthers) {
+  publish();
+  thread_ = std::jthread([this] { work(); });
+}
+
+void MappingWorker::hurry() {
+  const std::lock_guard lock(mutex_);
+  current_.request_stop();
+}
+
+void MappingWorker::finish() {
+  tasks_.close();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+void MappingWorker::rethrow() const {
+  if (failure_) {
+    std::rethrow_exception(failure_);
+  }
+}
+
+void MappingWorker::work() {
+  try {
+    while (auto task = tasks_.pop()) {
+      std::visit([this](auto& one) { run(one); }, *task);
+    }
+  } catch (...) {
+    failure_ = std::current_exception();
+    tasks_.close();
+  }
+  snapshots_.close();
+}
+
+void MappingWorker::run(MappingJob& job) {
+  std::stop_source stop;
+  {
+    const std::lock_guard lock(mutex_);
+    current_ = stop;
+  }
+  const KeyframeId id = mapping_.process(job, times_, stop.get_token(), [this] { publish(); });
+  keyframes_.push_back({job.camera, job.frame_index(), id});
+  events_.mapped(id, snapshots_.get());
+}
+
+void MappingWorker::run(LoopMeasurement& loop) {
+  const LoopOutcome outcome = mapping_.close(loop, times_, [this] { publish(); });
+  if (outcome.end == LoopEnd::kClosed) {
+    ++loops_closed_;
+  }
+  events_.looped(outcome, snapshots_.get(), loops_closed_);
+}
+
+void MappingWorker::run(FullCorrection& correction) {
+  if (correction.loops_closed != loops_closed_) {
+    return;
+  }
+  mapping_.take_in_full(std::move(correction.result), times_, [this] { publish(); });
+  loops_adjusted_ = loops_closed_;
+}
+
+}  // namespace hybrid_slam
