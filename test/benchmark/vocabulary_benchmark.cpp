@@ -1,17 +1,22 @@
-// The vocabulary: words of descriptors, loading, querying the inverted index, guided matching.
+// The vocabulary: words of descriptors, loading, querying the inverted index, candidates for loops,
+// guided matching.
 // Trees are complete, of 10 branches, their descriptors random around their parents'.
 #include <algorithm>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <benchmark/benchmark.h>
 
+#include "backend/map/map.h"
 #include "frontend/place_recognition/guided_matching.h"
 #include "frontend/place_recognition/inverted_index.h"
+#include "frontend/place_recognition/loop_detector.h"
 #include "frontend/place_recognition/vocabulary_file.h"
 #include "test/support/random.h"
+#include "test/support/synthetic_scene.h"
 #include "test/support/temp_folder.h"
 
 namespace hybrid_slam {
@@ -118,12 +123,12 @@ void load_mapped(benchmark::State& state) { load(state, VocabularyFormat::kMappe
 void load_compressed(benchmark::State& state) { load(state, VocabularyFormat::kCompressed); }
 void load_text(benchmark::State& state) { load(state, VocabularyFormat::kText); }
 
-// 1000 keyframes of 2000 features. An image shares an eighth of them with each of its neighbours.
+// Keyframes of 2000 features. An image shares an eighth of them with each of its neighbours.
 struct Keyframes {
-  explicit Keyframes(const Vocabulary& vocabulary) : index(vocabulary) {
+  Keyframes(const Vocabulary& vocabulary, std::int64_t count) : index(vocabulary) {
     Random random(3);
     FeatureSet last = random_features(vocabulary, 2000, random);
-    for (std::uint32_t i = 0; i < 1000; ++i) {
+    for (std::uint32_t i = 0; i < count; ++i) {
       FeatureSet features = random_features(vocabulary, 2000, random);
       std::copy_n(last.descriptors.end() - 250, 250, features.descriptors.begin());
       newest = find_words(vocabulary, features).bow;
@@ -136,12 +141,73 @@ struct Keyframes {
 };
 
 void query(benchmark::State& state) {
-  static std::map<std::int64_t, Keyframes> made;
-  const auto& keyframes =
-      made.try_emplace(state.range(0), vocabulary_of(state.range(0))).first->second;
+  static std::map<std::pair<std::int64_t, std::int64_t>, Keyframes> made;
+  const std::pair key(state.range(0), state.range(1));
+  const auto& keyframes = made.try_emplace(key, vocabulary_of(key.first), key.second).first->second;
   std::size_t hits = 0;
   for (auto _ : state) hits = keyframes.index.query(keyframes.newest, {}).size();
   state.counters["hits"] = static_cast<double>(hits);
+}
+
+// A map of keyframes of 2000 features that pass each of 500 places again and again, and a database
+// that follows it. An image shares an eighth of its features with each of its neighbours, and four
+// fifths of its landmarks.
+struct Survey {
+  Survey(const Vocabulary& vocabulary, std::int64_t count) : places(vocabulary) {
+    Random random(5);
+    std::vector<std::shared_ptr<const FrameObservations>> images;
+    for (std::size_t i = 0; i < 500; ++i) {
+      auto image = std::make_shared<FrameObservations>();
+      image->camera = CameraId(0);
+      image->features = random_features(vocabulary, 2000, random);
+      image->u_right.assign(2000, 0);
+      if (i > 0) {
+        const auto& last = images.back()->features.descriptors;
+        std::copy_n(last.end() - 250, 250, image->features.descriptors.begin());
+      }
+      images.push_back(std::move(image));
+    }
+    map.add_camera(synthetic_stereo_camera(0.1));
+    for (std::int64_t i = 0; i < count; ++i) {
+      NewKeyframe made;
+      made.observations = images[static_cast<std::size_t>(i) % images.size()];
+      made.landmarks.resize(2000);
+      made.reference = newest;
+      if (i % 500 != 0) {  // a lap shares no landmarks with the one before
+        const auto& last = map.view().at(newest).landmarks;
+        std::copy_n(last.begin(), 160, made.landmarks.begin() + 40);
+      }
+      for (std::uint32_t k = 0; k < (i % 500 == 0 ? 200 : 40); ++k) {
+        made.new_points.push_back({k, Eigen::Vector3d(random.gaussian3(1).x(), 0, 3)});
+      }
+      newest = map.add_keyframe(made);
+    }
+    places.follow(map.view());
+  }
+
+  Map map;
+  KeyframeDatabase places;
+  KeyframeId newest;
+};
+
+Survey& survey_of(std::int64_t count) {
+  static std::map<std::int64_t, Survey> made;
+  return made.try_emplace(count, vocabulary_of(4), count).first->second;
+}
+
+void detect_loop(benchmark::State& state) {
+  const Survey& survey = survey_of(state.range(0));
+  LoopDetector detector({});
+  std::size_t candidates = 0;
+  for (auto _ : state) {
+    candidates = detector.detect(survey.map.view(), survey.places, survey.newest).size();
+  }
+  state.counters["candidates"] = static_cast<double>(candidates);
+}
+
+void follow_unchanged(benchmark::State& state) {
+  Survey& survey = survey_of(state.range(0));
+  for (auto _ : state) survey.places.follow(survey.map.view());
 }
 
 struct Pair {
@@ -182,7 +248,12 @@ BENCHMARK(words_of_image)->Arg(4)->Arg(6)->Unit(benchmark::kMillisecond);
 BENCHMARK(load_mapped)->Arg(4)->Arg(6)->Unit(benchmark::kMillisecond);
 BENCHMARK(load_compressed)->Arg(4)->Unit(benchmark::kMillisecond);
 BENCHMARK(load_text)->Arg(4)->Unit(benchmark::kMillisecond);
-BENCHMARK(query)->Arg(4)->Arg(6)->Unit(benchmark::kMillisecond);
+BENCHMARK(query)
+    ->ArgsProduct({{4, 6}, {1000, 2000}})
+    ->ArgNames({"levels", "keyframes"})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(detect_loop)->Arg(200)->Arg(2000)->Unit(benchmark::kMillisecond);
+BENCHMARK(follow_unchanged)->Arg(200)->Arg(2000)->Unit(benchmark::kNanosecond);
 BENCHMARK(match_by_nodes)->Unit(benchmark::kMillisecond);
 BENCHMARK(match_all)->Unit(benchmark::kMillisecond);
 
