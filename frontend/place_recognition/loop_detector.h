@@ -30,10 +30,10 @@ struct LoopDetectorOptions {
 // best of each group of covisible keyframes whose accumulated score is near the best group's, then
 // groups that overlap with those of the keyframes before.
 //
-// One thing differs. With a small vocabulary unrelated images share many words and
-// score nearly as much as a revisit, so that a group would win by its size. What counts is therefore the
-// score above the base: the lower quartile of all candidates, or, where they are fewer than ten,
-// the score of the least similar covisible keyframe. ORB-SLAM2 asks for more than the latter's.
+// One thing differs. With a small vocabulary unrelated images share many words and score nearly as
+// much as a revisit, so that a group would win by its size. What counts is therefore the score
+// above the base: the lower quartile of all candidates, or, where they are fewer than ten, the
+// score of the least similar covisible keyframe. ORB-SLAM2 asks for more than the latter's.
 //
 // One thread at a time.
 class LoopDetector {
