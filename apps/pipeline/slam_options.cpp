@@ -254,6 +254,30 @@ void fields_of(S section, CullingOptions& options) {
 }
 
 template <typename S>
+void fields_of(S section, LoopOptions& options) {
+  LoopDetectorOptions& detector = options.finder.detector;
+  LoopVerifierOptions& verifier = options.finder.verifier;
+  section.field("enabled", options.enabled)
+      .field("min_gap", detector.min_gap)
+      .field("max_shared_landmarks", detector.max_shared_landmarks)
+      .field("min_word_share", detector.min_word_share)
+      .field("min_base_ratio", detector.min_base_ratio)
+      .field("min_score_share", detector.min_score_share)
+      .field("consistency", detector.consistency)
+      .field("max_candidates", detector.max_candidates)
+      .field("ratio", verifier.ratio)
+      .field("max_descriptor_distance", verifier.max_descriptor_distance)
+      .field("min_matches", verifier.min_matches)
+      .field("min_inliers", verifier.pose.min_inliers)
+      .field("search_radius", verifier.search_radius)
+      .field("min_final_matches", verifier.min_final_matches)
+      .field("min_found_share", verifier.min_found_share)
+      .field("min_confirmations", verifier.min_confirmations)
+      .field("surroundings_sigma", verifier.surroundings_sigma)
+      .refuse_unknown();
+}
+
+template <typename S>
 void fields_of(S section, BackendOptions& options) {
   section
       .choice("method",
@@ -273,6 +297,7 @@ void fields_of(S top, SlamOptions& options) {
   fields_of(top.section("triangulation"), options.triangulation);
   fields_of(top.section("fusion"), options.fusion);
   fields_of(top.section("culling"), options.culling);
+  fields_of(top.section("loops"), options.loops);
   fields_of(top.section("backend"), options.backend);
   top.field("features", options.features).field("seed", options.seed).refuse_unknown();
 }
@@ -287,6 +312,7 @@ void SlamOptions::distribute() {
     tracker->relocalization.ransac.seed = seed;
   }
   tracking.odometer.seed = seed;
+  loops.finder.verifier.pose.seed = seed;
 }
 
 std::string SlamOptions::validate() const {
@@ -296,7 +322,7 @@ std::string SlamOptions::validate() const {
   for (const std::string& error :
        {sift.validate(), stereo.validate(), tracking.validate(), fisheye.view.validate(),
         fisheye.tracking.validate(), triangulation.validate(), fusion.validate(),
-        culling.validate(), backend.validate()}) {
+        culling.validate(), loops.finder.validate(), backend.validate()}) {
     if (!error.empty()) {
       return error;
     }

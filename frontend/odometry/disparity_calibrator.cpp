@@ -112,6 +112,16 @@ double median_chi2(const std::vector<Contribution>& matches) {
   return *middle;
 }
 
+// What noise may shift the offset by.
+double shift_by_noise(const std::vector<double>& disparities, double noise_variance) {
+  const auto count = static_cast<double>(disparities.size());
+  double mean = 0;
+  for (const double d : disparities) mean += d / count;
+  double variance = 0;
+  for (const double d : disparities) variance += (d - mean) * (d - mean) / count;
+  return mean * noise_variance / std::max(variance, noise_variance);
+}
+
 struct OffsetStep {
   double information = 0;
   double step = 0;
@@ -166,6 +176,8 @@ void DisparityCalibrator::add(const StereoFeatures& previous, double previous_co
     return Eigen::Vector3d(left.x, left.y, features.u_right[i] + correction - at);
   };
   std::vector<Contribution> matches;
+  std::vector<double> disparities;
+  double squared_sigma = 0;
   for (const CircularMatch& match : motion.inliers) {
     const auto contribution =
         TwoFramePoint(camera_, motion.current_from_previous,
@@ -174,21 +186,30 @@ void DisparityCalibrator::add(const StereoFeatures& previous, double previous_co
                       measurement(current, match.current, current_correction),
                       current.left.keypoints[static_cast<std::size_t>(match.current)].sigma)
             .eliminate();
-    if (contribution) matches.push_back(*contribution);
+    if (!contribution) continue;
+    matches.push_back(*contribution);
+    const Eigen::Vector3d before = measurement(previous, match.previous, previous_correction);
+    disparities.push_back(before.x() - before.z());
+    const double sigma = previous.left.keypoints[static_cast<std::size_t>(match.previous)].sigma;
+    squared_sigma += sigma * sigma;
   }
   if (static_cast<int>(matches.size()) < options_.min_matches) return;
-  const auto step = eliminate_motion(matches, median_chi2(matches) / kMedianChi2);
-  if (step) {
-    const double information = step->information * kShareOfPair;
-    information_ += information;
-    weighted_sum_ += information * (at + step->step);
-  }
+  const double variance = median_chi2(matches) / kMedianChi2;
+  const auto step = eliminate_motion(matches, variance);
+  if (!step) return;
+  const double information = step->information * kShareOfPair;
+  information_ += information;
+  weighted_sum_ += information * (at + step->step);
+  const double noise = variance * squared_sigma / static_cast<double>(matches.size());
+  systematic_sum_ += information * shift_by_noise(disparities, noise);
 }
 
 double DisparityCalibrator::offset() const {
   return std::abs(estimate()) > options_.min_significance * sigma() ? estimate() : 0;
 }
 
-double DisparityCalibrator::sigma() const { return 1 / std::sqrt(information_); }
+double DisparityCalibrator::sigma() const {
+  return std::hypot(1 / std::sqrt(information_), systematic());
+}
 
 }  // namespace hybrid_slam

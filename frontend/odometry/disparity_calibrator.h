@@ -23,6 +23,11 @@ struct DisparityCalibratorOptions {
 // motion. This estimator adds up what the odometer's matches say of it, pair by pair: Gauss-Newton
 // in the motion and the offset (u_right measured = u_right true + offset), the motion eliminated,
 // the noise taken from the residuals themselves.
+//
+// Where all is about equally far (a seafloor from above), this is a line through a short row of
+// disparities, extended to zero. Noise flattens it unless the noise of each coordinate is known
+// exactly: by the share noise / spread of the disparities (variances), which at zero disparity is
+// that share of the mean disparity. Pairs do not average that out; it is part of sigma().
 class DisparityCalibrator {
  public:
   DisparityCalibrator(const Calibrated<RectifiedStereo>& camera,
@@ -37,11 +42,13 @@ class DisparityCalibrator {
 
  private:
   double estimate() const { return weighted_sum_ / information_; }
+  double systematic() const { return systematic_sum_ / information_; }
 
   Calibrated<RectifiedStereo> camera_;
   DisparityCalibratorOptions options_;
-  double information_ = 0;   // [1 / px^2]
-  double weighted_sum_ = 0;  // information x offset
+  double information_ = 0;     // [1 / px^2]
+  double weighted_sum_ = 0;    // information x offset
+  double systematic_sum_ = 0;  // information x what noise of unknown ratio may shift it by
 };
 
 }  // namespace hybrid_slam
