@@ -96,11 +96,11 @@ TEST_CASE("another visit is told, and its truth is in the same world as the firs
   with("0", {"--visit", "0"});
   with("1", {"--visit", "1"});
   const auto first = content_of(folder.path() / "plain"), again = content_of(folder.path() / "1");
-  CHECK(first == content_of(folder.path() / "0"));
+  CHECK((first == content_of(folder.path() / "0")));
   CHECK_FALSE(nlohmann::json::parse(first.at("stereo/scene.json")).contains("visit"));
   CHECK(nlohmann::json::parse(again.at("stereo/scene.json"))["visit"] == 1);
   for (const char* const image : {"stereo/images/0_0.jpg", "stereo/images/2_1.jpg"}) {
-    CHECK(first.at(image) != again.at(image));
+    CHECK((first.at(image) != again.at(image)));
   }
   for (const int visit : {0, 1}) {
     SceneOptions options = make_scene_options(SceneKind::kSurvey, Difficulty::kNormal, 7);
