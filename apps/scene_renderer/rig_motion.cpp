@@ -19,6 +19,7 @@ constexpr double kSurveyStep = 0.055;      // [m] per frame, unless the width as
 constexpr double kTurnSteps = 100.0 / 11;  // steps between two turns of the spiral
 constexpr double kSpiralShare = 0.65;      // of the path's length; the rest are arms across
 constexpr double kSurveyAltitude = 1.5;    // [m]
+constexpr double kVisitShare = 0.75;       // of the radius: beyond, the first spiral has gaps
 constexpr double kLeastClearance = 0.3;    // [m] of the wrist above the ground
 const Vector3d kSceneMiddle(0, 0, 0.2);    // what the hovering vehicle looks at
 
@@ -160,29 +161,31 @@ std::vector<Eigen::Vector2d> survey_path(double radius, double step, double leng
   return path;
 }
 
-// Where another visit flies its path.
+// Where a visit's path lies.
 struct PathPlacement {
+  double radius = 0;                                // [m]
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  // [m]
   double turn = 0;                                  // [rad], before the shift
 };
 
+// Another visit's path is small enough to see nothing that the first one did not.
 PathPlacement path_placement(const SceneOptions& options) {
   PathPlacement placement;
+  placement.radius = survey_radius(options);
   if (options.visit == 0) return placement;
   Counter random(visit_seed(options), 8000);
   const double way = 2 * kPi * random.uniform();
-  const double length = std::min<double>(random.uniform(0.2F, 0.4F), survey_radius(options) / 4);
+  const double length = std::min<double>(random.uniform(0.2F, 0.4F), placement.radius / 4);
+  placement.radius = kVisitShare * placement.radius - length;
   placement.shift = length * Eigen::Vector2d(std::cos(way), std::sin(way));
   const double turn = random.uniform(0.2F, 0.7F);
   placement.turn = random.uniform() < 0.5F ? -turn : turn;
   return placement;
 }
 
-// The whole path in the world. A shifted one is narrower by the shift: no visit leaves the circle.
 std::vector<Eigen::Vector2d> placed_path(const SceneOptions& options, double step) {
-  const auto [shift, turn] = path_placement(options);
-  std::vector<Eigen::Vector2d> path =
-      survey_path(survey_radius(options) - shift.norm(), step, options.frames * step);
+  const auto [radius, shift, turn] = path_placement(options);
+  std::vector<Eigen::Vector2d> path = survey_path(radius, step, options.frames * step);
   const Eigen::Rotation2Dd rotation(turn);
   for (Eigen::Vector2d& place : path) place = rotation * place + shift;
   return path;

@@ -25,7 +25,7 @@ double survey_radius(const SceneOptions& options);
 // between 0.4 and 1.5 m ahead of it and looks at what the stereo pair sees, from all its sides, at
 // least 0.3 m above the ground. Survey: a spiral at 1.5 m, then arms across it, at 0.055 m per
 // frame or as the width asks for; at another visit turned by 0.2 to 0.7 rad, shifted by 0.2 to 0.4
-// m (at most a quarter of the radius) and narrower by as much.
+// m (at most a quarter of the radius), and a quarter and the shift narrower.
 std::vector<RigMoment> make_motion(const SceneOptions& options, const RayCaster& seafloor);
 
 }  // namespace hybrid_slam
