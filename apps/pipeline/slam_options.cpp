@@ -155,6 +155,8 @@ void fields_of(S section, TrackRefinementOptions& options) {
       .field("keyframes", options.keyframes)
       .field("sigma", options.sigma)
       .field("max_view_angle_deg", options.max_view_angle_deg)
+      .field("patch_half_size", options.alignment.half_size)
+      .field("min_correlation", options.alignment.min_correlation)
       .refuse_unknown();
 }
 

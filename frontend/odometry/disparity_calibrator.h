@@ -27,7 +27,8 @@ struct DisparityCalibratorOptions {
 // Where all is about equally far (a seafloor from above), this is a line through a short row of
 // disparities, extended to zero. Noise flattens it unless the noise of each coordinate is known
 // exactly: by the share noise / spread of the disparities (variances), which at zero disparity is
-// that share of the mean disparity. Pairs do not average that out; it is part of sigma().
+// that share of the mean disparity. So does whatever else changes the motion that is seen. Pairs do
+// not average that out; it is part of sigma().
 class DisparityCalibrator {
  public:
   DisparityCalibrator(const Calibrated<RectifiedStereo>& camera,
@@ -48,7 +49,7 @@ class DisparityCalibrator {
   DisparityCalibratorOptions options_;
   double information_ = 0;     // [1 / px^2]
   double weighted_sum_ = 0;    // information x offset
-  double systematic_sum_ = 0;  // information x what noise of unknown ratio may shift it by
+  double systematic_sum_ = 0;  // information x what may shift it in every pair alike
 };
 
 }  // namespace hybrid_slam

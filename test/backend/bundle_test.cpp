@@ -15,7 +15,7 @@
 namespace hybrid_slam {
 namespace {
 
-constexpr FillOptions kNoisyStart{
+const FillOptions kNoisyStart{
     .rotation_noise = 0.01, .translation_noise = 0.03, .point_noise = 0.05};
 
 // Thresholds beyond the noise's reach: the solution is then the plain least squares one, whose

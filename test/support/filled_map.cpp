@@ -22,7 +22,10 @@ class MapFiller {
   }
 
   FilledMap fill() {
-    for (std::size_t f = 0; f < scene_.frames.size(); f += options_.stride) add_frame(f);
+    for (std::size_t f = 0; f < scene_.frames.size(); f += options_.stride) {
+      if (f >= options_.split && filled_.first_landmarks.empty()) begin_anew();
+      add_frame(f);
+    }
     return std::move(filled_);
   }
 
@@ -31,6 +34,17 @@ class MapFiller {
     std::size_t landmark;
     std::uint32_t keypoint;
   };
+
+  void begin_anew() {
+    filled_.first_landmarks = filled_.landmarks;
+    filled_.landmarks.assign(filled_.landmarks.size(), LandmarkId());
+    waiting_.assign(waiting_.size(), Observation());
+    for (Eigen::Vector3d& point : initial_) point = options_.split_drift * point;
+  }
+
+  Rigid3d misplaced(const Rigid3d& cam_from_world) const {
+    return without_scale(Sim3d(cam_from_world) * inverse(options_.split_drift));
+  }
 
   void add_frame(std::size_t index) {
     const SyntheticFrame& frame = scene_.frames[index];
@@ -44,6 +58,7 @@ class MapFiller {
       made.cam_from_world = se3_exp(noise) * frame.cam_from_world;
       made.reference = filled_.keyframes.back();
     }
+    if (index >= options_.split) made.cam_from_world = misplaced(made.cam_from_world);
     made.landmarks.resize(frame.landmark.size());
     std::vector<Unborn> unborn;
     for (std::uint32_t k = 0; k < frame.landmark.size(); ++k) {
