@@ -20,6 +20,11 @@ struct TrackRefinementOptions {
   double max_view_angle_deg = 35;  // between the two views of a patch
   AlignmentOptions alignment;
 
+  // Small patches: lamps that move along with the camera shade the ground anew from every place,
+  // and what is large in an image is shifted by that most. Of patches of 15 samples the scale of
+  // two rendered surveys came out 0.08 and 0.25 % too small, of 9 samples 0.05 and 0.11 %.
+  TrackRefinementOptions() { alignment.half_size = 4; }
+
   std::string validate() const;
 };
 

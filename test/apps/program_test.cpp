@@ -18,8 +18,9 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr double kMaxAte = 0.003;  // [m]; the path is 1.6 m long, the ground 2 m away
-constexpr const char* kResults[] = {"stereo.tum", "stereo_online.tum", "map.hslam",   "map.ply",
-                                    "map.png",    "timing.json",       "summary.json"};
+constexpr const char* kResults[] = {"stereo.tum",  "stereo_online.tum", "map.hslam",
+                                    "map.ply",     "map.png",           "loops.csv",
+                                    "timing.json", "summary.json"};
 
 std::string engine_by_default() {
   return to_string(why_no_cuda_sift({}).empty() ? SiftDevice::kCuda : SiftDevice::kCpu);
