@@ -82,7 +82,10 @@ std::optional<MappingJob> FrameTracking::finish(CameraKind camera, TrackedFrame 
   if (!tracked.keyframe) {
     return std::nullopt;
   }
-  return MappingJob{camera, std::move(*tracked.keyframe), std::exchange(counts_, {})};
+  const KeyframeId reference = tracked.keyframe->reference;
+  return MappingJob{camera, std::move(*tracked.keyframe),
+                    reference.valid() ? map.cam_from_world(reference) : Rigid3d(),
+                    std::exchange(counts_, {})};
 }
 
 }  // namespace hybrid_slam

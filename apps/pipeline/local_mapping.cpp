@@ -7,6 +7,23 @@
 
 namespace hybrid_slam {
 
+namespace {
+
+// The keyframe as it lies in `map`, which may have moved since it was tracked: by a loop that was
+// closed, far.
+NewKeyframe carried_along(const MappingJob& job, const MapSnapshot& map) {
+  NewKeyframe keyframe = job.keyframe;
+  if (!keyframe.reference.valid()) return keyframe;
+  const Rigid3d reference = map.cam_from_world(keyframe.reference);
+  if (reference.params == job.reference_from_world.params) return keyframe;
+  const Rigid3d now_from_then = inverse(reference) * job.reference_from_world;
+  keyframe.cam_from_world = keyframe.cam_from_world * inverse(now_from_then);
+  for (auto& [keypoint, point] : keyframe.new_points) point = now_from_then * point;
+  return keyframe;
+}
+
+}  // namespace
+
 void append_counts(const MapEdit& counts, MapEdit& waiting) {
   waiting.visible.insert(waiting.visible.end(), counts.visible.begin(), counts.visible.end());
   waiting.found.insert(waiting.found.end(), counts.found.begin(), counts.found.end());
@@ -27,7 +44,7 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
                                  const std::function<void()>& publish) {
   StageClock clock(times);
   backend_.apply(job.counts);
-  const KeyframeId id = backend_.add(job.keyframe);
+  const KeyframeId id = backend_.add(carried_along(job, backend_.view()));
   backend_.apply(probation_.cull(backend_.view(), id));
   clock.lap("insert_keyframe");
   backend_.apply(triangulate_with_neighbours(backend_.view(), id, options_.triangulation));

@@ -16,6 +16,7 @@ namespace hybrid_slam {
 struct MappingJob {
   CameraKind camera = CameraKind::kStereo;
   NewKeyframe keyframe;
+  Rigid3d reference_from_world;  // pose of keyframe.reference in the map it was tracked in
   MapEdit counts;
 
   std::int64_t frame_index() const { return keyframe.observations->frame_index; }
