@@ -77,7 +77,7 @@ std::optional<MappingJob> FrameTracking::track_fisheye(FrameSet frames, const Ma
 
 std::optional<MappingJob> FrameTracking::finish(CameraKind camera, TrackedFrame tracked,
                                                 const MapSnapshot& map) {
-  append_counts(tracked.counts, counts_);
+  if (!localize_) append_counts(tracked.counts, counts_);  // no keyframe would take them
   recorder_.tracked(camera, tracked, map);
   if (!tracked.keyframe) {
     return std::nullopt;
