@@ -30,10 +30,18 @@ class SimulatedLoader final : public FrameLoader {
         frames.fisheye = without_features(*frames.fisheye);
       }
     }
+    number(index, frames.stereo);
+    if (frames.fisheye) number(index, *frames.fisheye);
     return frames;
   }
 
  private:
+  void number(std::size_t index, Frame& frame) const {
+    if (source_.order.empty()) return;
+    frame.index = static_cast<std::int64_t>(index);
+    frame.time = static_cast<double>(index) / source_.scene().options.frame_rate;
+  }
+
   const SimulatedSource& source_;
 };
 

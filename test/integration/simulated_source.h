@@ -2,6 +2,7 @@
 
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "apps/pipeline/frame_source.h"
 #include "test/support/synthetic_scene.h"
@@ -14,7 +15,9 @@ class SimulatedSource final : public FrameSource {
  public:
   explicit SimulatedSource(SyntheticScene scene) : scene_(std::move(scene)) {}
 
-  std::size_t size() const override { return scene_.frames.size() / scene_.cameras.size(); }
+  std::size_t size() const override {
+    return order.empty() ? scene_.frames.size() / scene_.cameras.size() : order.size();
+  }
   const Calibrated<RectifiedStereo>& camera() const override {
     return std::get<Calibrated<RectifiedStereo>>(scene_.cameras.front());
   }
@@ -24,22 +27,27 @@ class SimulatedSource final : public FrameSource {
   }
   std::unique_ptr<FrameLoader> make_loader() const override;
 
-  // What is known of the frames of moment `index`.
+  // What is known of the frames of this index.
   const SyntheticFrame& stereo_truth(std::size_t index) const {
-    return scene_.frames[index * scene_.cameras.size()];
+    return scene_.frames[moment(index) * scene_.cameras.size()];
   }
   const SyntheticFrame& fisheye_truth(std::size_t index) const {
-    return scene_.frames[index * scene_.cameras.size() + 1];
+    return scene_.frames[moment(index) * scene_.cameras.size() + 1];
   }
 
   const SyntheticScene& scene() const { return scene_; }
 
+  // The scene's moments in the order in which they come, some never, some again; empty: as they
+  // are. Frames are numbered and timed as they come.
+  std::vector<std::size_t> order;
   std::set<std::size_t> corrupt;          // indices that cannot be read
   std::set<std::size_t> blank;            // indices without a single feature in the stereo pair
   std::set<std::size_t> fisheye_blank;    // likewise, of the fisheye
   std::set<std::size_t> fisheye_missing;  // indices at which the fisheye's image cannot be read
 
  private:
+  std::size_t moment(std::size_t index) const { return order.empty() ? index : order[index]; }
+
   SyntheticScene scene_;
 };
 

@@ -1,0 +1,174 @@
+// Places found again: after the camera was blind, and in maps of runs before.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <set>
+
+#include "test/integration/simulated_runs.h"
+#include "test/support/random.h"
+
+namespace hybrid_slam {
+namespace {
+
+constexpr std::size_t kBlind = 30;   // frames: 3 s
+constexpr std::size_t kInTime = 20;  // frames: 2 s
+
+struct Kidnapping {
+  bool found = false;     // in time
+  std::size_t after = 0;  // frames
+  double error = 0;       // [m] of the first pose then
+  double map_error = 0;   // [m] of the last pose before
+  std::string faults;     // of the map
+};
+
+// The camera is blind for a while in the middle of its way, and then is at an earlier place.
+Kidnapping kidnap(std::uint64_t seed) {
+  SyntheticSceneOptions options = orbit_of(36);
+  options.landmarks = 3000;
+  options.seed = seed;
+  SimulatedSource source(make_synthetic_scene(options));
+  Random random(1000 + seed);
+  const std::size_t flown = 18 + random.below(18);
+  const std::size_t back = random.below(flown - 10);
+  for (std::size_t i = 0; i < flown; ++i) source.order.push_back(i);
+  for (std::size_t i = 0; i < kBlind; ++i) {
+    source.blank.insert(source.order.size());
+    source.order.push_back(0);
+  }
+  const std::size_t first = source.order.size();
+  for (std::size_t i = 0; i < kInTime; ++i) {  // goes on from there, and stays where that ends
+    source.order.push_back(std::min(back + i, std::size_t{35}));
+  }
+  const RunResult result = run_every_frame(source, simulated_options(), simulated_run(), {});
+  Kidnapping kidnapping;
+  kidnapping.faults = faults_of(*result.map);
+  kidnapping.map_error = position_error(result, source, flown - 1);
+  for (std::size_t i = first; i < first + kInTime && !kidnapping.found; ++i) {
+    if (!result.records.at(i).frame.tracked()) continue;
+    kidnapping.found = true;
+    kidnapping.after = i - first;
+    kidnapping.error = position_error(result, source, i);
+  }
+  return kidnapping;
+}
+
+void check_kidnappings(std::uint64_t first, std::uint64_t count) {
+  std::uint64_t found = 0;
+  double worst = 0;
+  std::size_t latest = 0;
+  for (std::uint64_t seed = first; seed < first + count; ++seed) {
+    const Kidnapping one = kidnap(seed);
+    CAPTURE(seed, one.found, one.after, one.error, one.map_error);
+    CHECK(one.faults == "");
+    if (!one.found) continue;
+    CHECK(one.error < 0.02);
+    ++found;
+    worst = std::max(worst, one.error);
+    latest = std::max(latest, one.after);
+  }
+  CHECK(100 * found >= 95 * count);
+  WARN("found " << found << " of " << count << ", worst error " << worst << " m, latest after "
+                << latest << " frames");
+}
+
+// Hovering, seen by two runs: of even and of odd moments.
+SimulatedSource hover(std::size_t start) {
+  SyntheticSceneOptions options;
+  options.trajectory = SceneTrajectory::kHover;
+  options.times = 60;
+  options.landmarks = 3000;
+  options.clutter = 100;
+  SimulatedSource source(make_synthetic_scene(options));
+  for (std::size_t i = start; i < 60; i += 2) source.order.push_back(i);
+  return source;
+}
+
+RunResult first_run() {
+  return run_every_frame(hover(0), simulated_options(), simulated_run(), {});
+}
+
+// No two frames of a map have one camera and one index.
+bool frames_differ(const MapSnapshot& map) {
+  std::set<std::pair<CameraId, std::int64_t>> frames;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const FrameObservations& frame = *map.at(id).observations;
+    if (!frames.emplace(frame.camera, frame.frame_index).second) return false;
+    if (map.find_frame(frame.camera, frame.frame_index) != &map.at(id)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+TEST_CASE("A kidnapped camera is found at the place where it is", "[integration]") {
+  check_kidnappings(1, 5);
+}
+
+TEST_CASE("Of twenty kidnapped cameras nineteen are found", "[integration][slow]") {
+  check_kidnappings(101, 20);
+}
+
+TEST_CASE("A second run goes on with the map of the first", "[integration]") {
+  const RunResult a = first_run();
+  const SimulatedSource source = hover(1);
+  for (const bool realtime : {false, true}) {
+    const auto run_b = realtime ? run_realtime : run_every_frame;
+    const RunResult b = run_b(source, simulated_options(), simulated_run(), {}, copy_of(*a.map));
+    CHECK(b.frames.tracked == 30);
+    CHECK(b.records.front().frame.source == PoseSource::kRelocalization);
+    CHECK(b.map->camera_count() == a.map->camera_count());
+    CHECK(b.map->origin() == a.map->origin());
+    CHECK(b.map->next_keyframe_id() >= a.map->next_keyframe_id());
+    for (const FrameRecord& record : b.records) {
+      if (record.keyframe) CHECK(*record.keyframe >= a.map->next_keyframe_id());
+      CHECK(record.frame.frame_index > a.map->newest_frame_index(CameraId(0)));
+    }
+    CHECK(frames_differ(*b.map));
+    CHECK(max_position_error(b, source) < 0.01);
+    CHECK(faults_of(*b.map) == "");
+    WARN("keyframes " << a.map->keyframe_count() << " -> " << b.map->keyframe_count()
+                      << " max error " << max_position_error(b, source));
+  }
+}
+
+TEST_CASE("Localising tracks every frame and leaves the map as it was", "[integration]") {
+  const RunResult a = first_run();
+  const SimulatedSource source = hover(1);
+  RunOptions run = simulated_run();
+  run.localize = true;
+  for (const bool realtime : {false, true}) {
+    const auto run_c = realtime ? run_realtime : run_every_frame;
+    const RunResult c = run_c(source, simulated_options(), run, {}, copy_of(*a.map));
+    CHECK(c.frames.tracked == 30);
+    CHECK(max_position_error(c, source) < 0.01);
+    CHECK(c.loops.empty());
+    CHECK(bytes_of(*c.map) == bytes_of(*a.map));
+    for (const FrameRecord& record : c.records) {
+      CHECK_FALSE(record.keyframe);
+      CHECK(record.frame.frame_index > a.map->newest_frame_index(CameraId(0)));
+    }
+    WARN("localised, max error " << max_position_error(c, source));
+  }
+}
+
+TEST_CASE("A run with another camera adds it to the map", "[integration]") {
+  const RunResult a = first_run();
+  SyntheticScene scene = hover(1).scene();
+  scene.cameras.front() = synthetic_stereo_camera(0.1201);
+  SimulatedSource source(std::move(scene));
+  source.order = hover(1).order;
+  const RunResult b =
+      run_every_frame(source, simulated_options(), simulated_run(), {}, copy_of(*a.map));
+  CHECK(b.map->camera_count() == 2);
+  CHECK(b.frames.tracked == 30);
+  CHECK(b.records.front().frame.source == PoseSource::kRelocalization);
+  CHECK(max_position_error(b, source) < 0.015);
+  for (const FrameRecord& record : b.records) {
+    if (record.keyframe && b.map->find(*record.keyframe) != nullptr) {
+      CHECK(b.map->at(*record.keyframe).observations->camera == CameraId(1));
+    }
+  }
+  CHECK(frames_differ(*b.map));
+  CHECK(faults_of(*b.map) == "");
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,91 @@
+#include "test/integration/simulated_runs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "backend/map/map_file.h"
+#include "cameras/input_error.h"
+#include "test/frontend/place_recognition/sample_vocabulary.h"
+#include "test/support/temp_folder.h"
+
+namespace hybrid_slam {
+
+SyntheticSceneOptions orbit_of(int times) {
+  SyntheticSceneOptions options;
+  options.trajectory = SceneTrajectory::kOrbit;
+  options.times = times;
+  options.step = 2 * std::numbers::pi * 3 / kOrbitFrames;
+  options.landmarks = 4000;
+  options.clutter = 100;
+  return options;
+}
+
+SlamOptions simulated_options(bool loops) {
+  SlamOptions options;
+  options.features = 1000;
+  options.loops.enabled = loops;
+  options.distribute();
+  return options;
+}
+
+RunOptions simulated_run() {
+  static const Vocabulary vocabulary = [] {
+    SyntheticSceneOptions options;
+    options.landmarks = 3000;
+    options.seed = 99;
+    return scene_vocabulary(make_synthetic_scene(options));
+  }();
+  RunOptions run;
+  run.vocabulary = vocabulary;
+  return run;
+}
+
+double position_error(const RunResult& result, const SimulatedSource& source, std::size_t index) {
+  const Rigid3d estimate = result.cam_from_world(result.records.at(index));
+  return (origin_in_a(estimate) - origin_in_a(source.stereo_truth(index).cam_from_world)).norm();
+}
+
+double rms_position_error(const RunResult& result, const SimulatedSource& source) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < result.records.size(); ++i) {
+    if (!result.records[i].frame.tracked()) continue;
+    sum += std::pow(position_error(result, source, i), 2);
+    ++count;
+  }
+  return std::sqrt(sum / count);
+}
+
+double max_position_error(const RunResult& result, const SimulatedSource& source) {
+  double most = 0;
+  for (std::size_t i = 0; i < result.records.size(); ++i) {
+    if (!result.records[i].frame.tracked()) continue;
+    most = std::max(most, position_error(result, source, i));
+  }
+  return most;
+}
+
+std::string bytes_of(const MapSnapshot& map) {
+  const TempFolder folder;
+  save_map(folder.path() / "map.hslam", map, {});
+  return read_text(folder.path() / "map.hslam");
+}
+
+Map copy_of(const MapSnapshot& map) {
+  const TempFolder folder;
+  save_map(folder.path() / "map.hslam", map, {});
+  return load_map(folder.path() / "map.hslam").map;
+}
+
+std::string faults_of(const MapSnapshot& map) {
+  try {
+    copy_of(map);
+    return {};
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+}  // namespace hybrid_slam
