@@ -84,7 +84,8 @@ TEST_CASE("a map continued from a load becomes the one that was never saved") {
     CHECK(filled.map.view().cam_from_world(id).params ==
           loaded.map.view().cam_from_world(id).params);
   }
-  FilledMap twin{std::move(loaded.map), filled.frames, filled.keyframes, filled.landmarks};
+  FilledMap twin{std::move(loaded.map), filled.frames, filled.keyframes, filled.landmarks,
+                 filled.first_landmarks};
   RandomEdits edits(filled, 11);
   RandomEdits same_edits(twin, 11);
   for (int i = 0; i < 1500; ++i) {
