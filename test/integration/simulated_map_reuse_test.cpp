@@ -24,6 +24,7 @@ struct Kidnapping {
 Kidnapping kidnap(std::uint64_t seed) {
   SyntheticSceneOptions options = orbit_of(36);
   options.landmarks = 3000;
+  options.noise = 0.15;
   options.seed = seed;
   SimulatedSource source(make_synthetic_scene(options));
   Random random(1000 + seed);
@@ -38,7 +39,7 @@ Kidnapping kidnap(std::uint64_t seed) {
   for (std::size_t i = 0; i < kInTime; ++i) {  // goes on from there, and stays where that ends
     source.order.push_back(std::min(back + i, std::size_t{35}));
   }
-  const RunResult result = run_every_frame(source, simulated_options(), simulated_run(), {});
+  const RunResult result = run_every_frame(source, simulated_options(), simulated_run(source), {});
   Kidnapping kidnapping;
   kidnapping.faults = faults_of(*result.map);
   kidnapping.map_error = position_error(result, source, flown - 1);
@@ -65,9 +66,9 @@ void check_kidnappings(std::uint64_t first, std::uint64_t count) {
     worst = std::max(worst, one.error);
     latest = std::max(latest, one.after);
   }
-  CHECK(100 * found >= 95 * count);
-  WARN("found " << found << " of " << count << ", worst error " << worst << " m, latest after "
+  INFO("found " << found << " of " << count << ", worst error " << worst << " m, latest after "
                 << latest << " frames");
+  CHECK(100 * found >= 95 * count);
 }
 
 // Hovering, seen by two runs: of even and of odd moments.
@@ -76,6 +77,7 @@ SimulatedSource hover(std::size_t start) {
   options.trajectory = SceneTrajectory::kHover;
   options.times = 60;
   options.landmarks = 3000;
+  options.noise = 0.15;
   options.clutter = 100;
   SimulatedSource source(make_synthetic_scene(options));
   for (std::size_t i = start; i < 60; i += 2) source.order.push_back(i);
@@ -83,7 +85,8 @@ SimulatedSource hover(std::size_t start) {
 }
 
 RunResult first_run() {
-  return run_every_frame(hover(0), simulated_options(), simulated_run(), {});
+  const SimulatedSource source = hover(0);
+  return run_every_frame(source, simulated_options(), simulated_run(source), {});
 }
 
 // No two frames of a map have one camera and one index.
@@ -112,7 +115,8 @@ TEST_CASE("A second run goes on with the map of the first", "[integration]") {
   const SimulatedSource source = hover(1);
   for (const bool realtime : {false, true}) {
     const auto run_b = realtime ? run_realtime : run_every_frame;
-    const RunResult b = run_b(source, simulated_options(), simulated_run(), {}, copy_of(*a.map));
+    const RunResult b =
+        run_b(source, simulated_options(), simulated_run(source), {}, copy_of(*a.map));
     CHECK(b.frames.tracked == 30);
     CHECK(b.records.front().frame.source == PoseSource::kRelocalization);
     CHECK(b.map->camera_count() == a.map->camera_count());
@@ -125,15 +129,13 @@ TEST_CASE("A second run goes on with the map of the first", "[integration]") {
     CHECK(frames_differ(*b.map));
     CHECK(max_position_error(b, source) < 0.01);
     CHECK(faults_of(*b.map) == "");
-    WARN("keyframes " << a.map->keyframe_count() << " -> " << b.map->keyframe_count()
-                      << " max error " << max_position_error(b, source));
   }
 }
 
 TEST_CASE("Localising tracks every frame and leaves the map as it was", "[integration]") {
   const RunResult a = first_run();
   const SimulatedSource source = hover(1);
-  RunOptions run = simulated_run();
+  RunOptions run = simulated_run(source);
   run.localize = true;
   for (const bool realtime : {false, true}) {
     const auto run_c = realtime ? run_realtime : run_every_frame;
@@ -146,7 +148,6 @@ TEST_CASE("Localising tracks every frame and leaves the map as it was", "[integr
       CHECK_FALSE(record.keyframe);
       CHECK(record.frame.frame_index > a.map->newest_frame_index(CameraId(0)));
     }
-    WARN("localised, max error " << max_position_error(c, source));
   }
 }
 
@@ -157,7 +158,7 @@ TEST_CASE("A run with another camera adds it to the map", "[integration]") {
   SimulatedSource source(std::move(scene));
   source.order = hover(1).order;
   const RunResult b =
-      run_every_frame(source, simulated_options(), simulated_run(), {}, copy_of(*a.map));
+      run_every_frame(source, simulated_options(), simulated_run(source), {}, copy_of(*a.map));
   CHECK(b.map->camera_count() == 2);
   CHECK(b.frames.tracked == 30);
   CHECK(b.records.front().frame.source == PoseSource::kRelocalization);

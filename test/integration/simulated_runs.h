@@ -17,8 +17,8 @@ SyntheticSceneOptions orbit_of(int times);
 
 SlamOptions simulated_options(bool loops = true);
 
-// With a vocabulary of simulated descriptors: those of all scenes come from one distribution.
-RunOptions simulated_run();
+// With a vocabulary of what is seen in the scene, of some of its frames.
+RunOptions simulated_run(const SimulatedSource& source);
 
 // Between the estimated and the true camera centres; both worlds are the first frame's camera. Of
 // runs that read each frame of the source.

@@ -15,20 +15,20 @@ using Seconds = std::chrono::duration<double>;
 // The end of a lap, to go on with a map of what comes before: the loop is met soon.
 struct EndOfLap {
   EndOfLap() : source(make_synthetic_scene(scene())) {
-    for (std::size_t i = 0; i < 45; ++i) source.order.push_back(i);
-    map = bytes_map();
+    for (std::size_t i = 0; i < 53; ++i) source.order.push_back(i);
+    map = first_part();
     source.order.clear();
-    for (std::size_t i = 42; i < 69; ++i) source.order.push_back(i);
+    for (std::size_t i = 50; i < 78; ++i) source.order.push_back(i);
   }
 
   static SyntheticSceneOptions scene() {
-    SyntheticSceneOptions options = orbit_of(69);
+    SyntheticSceneOptions options = orbit_of(78);
     options.noise = 0.5;
     options.landmarks = 3000;
     return options;
   }
-  std::shared_ptr<const MapSnapshot> bytes_map() const {
-    return run_every_frame(source, simulated_options(), simulated_run(), {}).map;
+  std::shared_ptr<const MapSnapshot> first_part() const {
+    return run_every_frame(source, simulated_options(), simulated_run(source), {}).map;
   }
 
   SimulatedSource source;
@@ -38,7 +38,7 @@ struct EndOfLap {
 // Starts and stops, by turns at a random frame and at a random time.
 void start_and_stop(int cycles, std::uint64_t seed) {
   const EndOfLap lap;
-  RunOptions run = simulated_run();
+  RunOptions run = simulated_run(lap.source);
   run.threads = 2;
   const auto start = std::chrono::steady_clock::now();
   const RunResult whole = run_realtime(lap.source, simulated_options(), run, {}, copy_of(*lap.map));
@@ -71,13 +71,13 @@ void start_and_stop(int cycles, std::uint64_t seed) {
     CHECK(faults_of(*result.map) == "");
     CHECK(result.internal_errors.empty());
     CHECK((result.cancelled || result.frames.read == static_cast<int>(lap.source.size())));
-    CHECK(result.frames.tracked == result.frames.read);
     for (const FrameRecord& record : result.records) {
       CHECK(result.cam_from_world(record).params.allFinite());
     }
     for (const LoopRecord& loop : result.loops) loops += loop.outcome == kLoopAccepted ? 1 : 0;
   }
-  WARN("whole run " << seconds << " s, loops closed in " << cycles << " runs: " << loops);
+  INFO("whole run " << seconds << " s, loops closed in " << cycles << " runs: " << loops);
+  CHECK(loops >= cycles / 5);  // else these runs would show little
 }
 
 }  // namespace
