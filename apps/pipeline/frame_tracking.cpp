@@ -1,6 +1,7 @@
 #include "apps/pipeline/frame_tracking.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 namespace hybrid_slam {
@@ -26,6 +27,9 @@ FrameTracking::FrameTracking(const FrameSource& source, const SlamOptions& optio
       times_(times),
       localize_(run.localize),
       first_index_(next_frame_index(mapping.map().view())) {
+  if (localize_ && !mapping.map().view().origin().valid()) {
+    throw std::logic_error("FrameTracking: nothing to localise in");
+  }
   if (source.fisheye() != nullptr) {
     fisheye_.emplace(mapping.camera_id(*source.fisheye()), *source.fisheye(),
                      options.fisheye.tracking, places_);
