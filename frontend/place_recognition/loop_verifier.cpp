@@ -26,13 +26,24 @@ struct Side {
       keyframes.push_back(near.id);
     }
     for (const KeyframeId near : keyframes) {
-      metric = metric || baseline(map.camera(map.at(near))) > 0;
       for (const LandmarkId landmark : map.at(near).landmarks) {
         if (landmark.valid()) landmarks.push_back(landmark);
       }
     }
     std::sort(landmarks.begin(), landmarks.end());
     landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+    metric = knows_scale(map, keyframe, options);
+  }
+
+  // All neighbours count here: the strongest ones of a fisheye, which sees more, are fisheyes.
+  static bool knows_scale(const MapSnapshot& map, const Keyframe& keyframe,
+                          const LoopVerifierOptions& options) {
+    const auto is_pair = [&](KeyframeId id) { return baseline(map.camera(map.at(id))) > 0; };
+    return is_pair(keyframe.id) ||
+           std::any_of(
+               keyframe.covisible.begin(), keyframe.covisible.end(), [&](const Covisible& near) {
+                 return near.shared_landmarks >= options.min_shared_landmarks && is_pair(near.id);
+               });
   }
 
   bool knows(LandmarkId id) const {
@@ -45,7 +56,7 @@ struct Side {
   KeypointGrid grid;
   std::vector<KeyframeId> keyframes;  // the end itself first
   std::vector<LandmarkId> landmarks;  // of all of them, ascending
-  bool metric = false;                // a stereo pair is among them: the scale is known
+  bool metric = false;                // it or a neighbour, however weak, is a stereo pair
 };
 
 // A landmark of the newer side at a keypoint of its keyframe, and one of the older side.

@@ -156,6 +156,34 @@ TEST_CASE("A fisheye alone has a scale of its own, which the loop measures") {
   CHECK(found >= 4);
 }
 
+TEST_CASE("A stereo pair and a fisheye find one another, at the scale that the pairs know") {
+  // Both fly both laps. Frame 2 t is the pair's, the next one the fisheye's, whose strongest
+  // neighbours are other fisheyes.
+  const SyntheticScene scene = circle_twice(true);
+  FillOptions fill;
+  fill.split = 2 * kLaps;
+  fill.split_drift = drift(1);
+  const FilledMap filled = fill_map(scene, fill);
+  KeyframeDatabase places(scene_vocabulary(scene));
+  places.follow(filled.map.view());
+  for (std::size_t time = 0; time < kLaps; time += 8) {
+    for (const std::size_t newer_is_fisheye : {0, 1}) {
+      const std::size_t older = 2 * time + (1 - newer_is_fisheye);
+      const std::size_t newer = 2 * (kLaps + time) + newer_is_fisheye;
+      const LoopVerification verified = LoopVerifier({}).verify(
+          filled.map.view(), filled.keyframes[newer], filled.keyframes[older], places);
+      REQUIRE(verified.loop);
+      CHECK(!verified.loop->with_scale);
+      CHECK(verified.loop->keyframe_from_match.scale() == 1);
+      const Rigid3d off = inverse(scene.frames[newer].cam_from_world *
+                                  inverse(scene.frames[older].cam_from_world)) *
+                          without_scale(verified.loop->keyframe_from_match);
+      CHECK(off.translation().norm() < 0.003);
+      CHECK(so3_log(off.rotation()).norm() < 0.001);
+    }
+  }
+}
+
 TEST_CASE("Other places are none") {
   const TwoParts parts(circle_twice());
   for (std::size_t i = 0; i < kLaps; i += 5) {
