@@ -241,6 +241,29 @@ TEST_CASE("A patch that repeats, in its texture and its shape, is no loop") {
   CHECK(fooled > 0);  // it is these bounds that refuse them
 }
 
+TEST_CASE("A compact patch that repeats exactly is no loop") {
+  SyntheticSceneOptions options;
+  options.times = 2 * kLaps;
+  options.step = 2 * std::numbers::pi * 3 / kLaps;
+  options.landmarks = 12000;
+  options.noise = 0.1;
+  options.clutter = 50;
+  const SyntheticScene scene = make_synthetic_scene(options);
+  constexpr std::size_t kAt = 5;
+  const auto verified_with = [&](double radius) {  // [m] of the patch amid the view
+    const auto in_patch = [&](int landmark) {
+      const Eigen::Vector3d point = scene.frames[kAt].cam_from_world *
+                                    scene.points_in_world[static_cast<std::size_t>(landmark)];
+      return point.head<2>().norm() < radius;
+    };
+    return TwoParts(with_other_surroundings(scene, in_patch)).verify(kLaps + kAt, kAt);
+  };
+  CHECK(verified_with(0.3).reason == LoopRejection::kFewAfterSearch);  // 29
+  const LoopVerification patch = verified_with(0.6);                   // 132
+  CHECK(patch.inliers > 100);  // it does agree with one motion
+  CHECK(patch.reason == LoopRejection::kUnlike);
+}
+
 TEST_CASE("A place that no neighbour sees is not confirmed") {
   const TwoParts parts(circle_twice());
   LoopVerifierOptions options;
