@@ -165,6 +165,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   if (sequence.fisheye) json["fisheye"] = fisheye_json(result, summary);
   json["disparity_offset_px"] =
       result.records.empty() ? 0 : result.records.back().frame.disparity_offset;
+  json["shading_depth_per_size"] = result.records.empty() ? 0 : result.records.back().frame.shading;
   json["interrupted"] = result.cancelled;
   json["internal_errors"] = result.internal_errors;
   json["seconds"] = summary.seconds;

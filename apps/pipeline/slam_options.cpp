@@ -150,10 +150,21 @@ void fields_of(S section, DisparityCalibratorOptions& options) {
 }
 
 template <typename S>
+void fields_of(S section, ShadingCalibratorOptions& options) {
+  section.field("enabled", options.enabled)
+      .field("prior_sigma", options.prior_sigma)
+      .field("min_significance", options.min_significance)
+      .field("min_tracks", options.min_tracks)
+      .refuse_unknown();
+}
+
+template <typename S>
 void fields_of(S section, TrackRefinementOptions& options) {
+  fields_of(section.section("shading"), options.shading);
   section.field("enabled", options.enabled)
       .field("keyframes", options.keyframes)
       .field("sigma", options.sigma)
+      .field("min_sigma", options.min_sigma)
       .field("max_view_angle_deg", options.max_view_angle_deg)
       .field("patch_half_size", options.alignment.half_size)
       .field("min_correlation", options.alignment.min_correlation)

@@ -25,7 +25,8 @@ struct Frame {
 
   double u_right_correction = 0;  // [px] subtracted from what was measured
   Rigid3d cam_from_world;
-  std::vector<LandmarkId> landmarks;  // one per keypoint; invalid where there is none
+  std::vector<LandmarkId> landmarks;   // one per keypoint; invalid where there is none
+  std::vector<std::size_t> aligned{};  // keypoints whose positions TrackRefiner moved
 
   std::size_t size() const { return features.left.size(); }
 };

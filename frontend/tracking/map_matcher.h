@@ -79,7 +79,12 @@ class MapMatcher {
                   Frame& frame) const;
 
   // The frame becomes a keyframe: its image can serve as a reference.
-  void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }
+  void remember_keyframe(const MapSnapshot& map, const Frame& frame) {
+    refiner_.remember(map, frame);
+  }
+
+  // See TrackRefiner.
+  double shading() const { return refiner_.shading(); }
 
  private:
   bool relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,

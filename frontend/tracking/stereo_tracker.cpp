@@ -57,7 +57,7 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
 TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allow_keyframe) {
   if (!map.origin().valid()) {
     TrackedFrame result = initialize(frame);
-    return remember(std::move(frame), std::move(result));
+    return remember(map, std::move(frame), std::move(result));
   }
   last_.follow(map);
   correct_disparities(frame);
@@ -65,6 +65,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
   result.frame_index = frame.index;
   result.time = frame.time;
   result.disparity_offset = frame.u_right_correction;
+  result.shading = matcher_.shading();
   if (last_.tracked()) {
     predict(frame, result);
     const Rigid3d predicted = frame.cam_from_world;
@@ -94,7 +95,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
       result.keyframe = make_keyframe(frame, result.reference);
     }
   }
-  return remember(std::move(frame), std::move(result));
+  return remember(map, std::move(frame), std::move(result));
 }
 
 TrackedFrame StereoTracker::initialize(Frame& frame) const {
@@ -210,9 +211,9 @@ int StereoTracker::share_of_features(const Frame& frame, double share) const {
       share * std::min<double>(options_.max_features, static_cast<double>(frame.size())));
 }
 
-TrackedFrame StereoTracker::remember(Frame frame, TrackedFrame result) {
+TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, TrackedFrame result) {
   if (result.keyframe) {
-    matcher_.remember_keyframe(frame);
+    matcher_.remember_keyframe(map, frame);
   }
   last_.remember(std::move(frame), result);
   return result;

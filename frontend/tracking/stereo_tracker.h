@@ -57,7 +57,7 @@ class StereoTracker {
   NewKeyframe make_keyframe(const Frame& frame, KeyframeId reference) const;
   double close_depth() const { return options_.close_baselines * baseline(camera_); }
   int share_of_features(const Frame& frame, double share) const;
-  TrackedFrame remember(Frame frame, TrackedFrame result);
+  TrackedFrame remember(const MapSnapshot& map, Frame frame, TrackedFrame result);
 
   CameraId camera_id_;
   Camera camera_;

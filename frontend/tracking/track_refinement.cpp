@@ -45,24 +45,32 @@ struct TrackRefiner::Reference {
   const ImagePyramid* image = nullptr;
   const Keyframe* keyframe = nullptr;
   const Keypoint* keypoint = nullptr;
+  float u_right = kNoRightMatch;
 };
 
 std::string TrackRefinementOptions::validate() const {
-  if (keyframes < 1 || !(sigma > 0) || !(max_view_angle_deg > 0)) {
-    return "refinement: keyframes, sigma and max_view_angle_deg must be positive";
+  if (keyframes < 1 || !(sigma > 0) || !(min_sigma > 0) || !(max_view_angle_deg > 0)) {
+    return "refinement: keyframes, sigma, min_sigma and max_view_angle_deg must be positive";
   }
-  const std::string error = alignment.validate();
-  return error.empty() ? error : "refinement: " + error;
+  for (const std::string& error : {alignment.validate(), shading.validate()}) {
+    if (!error.empty()) return "refinement: " + error;
+  }
+  return {};
 }
 
 TrackRefiner::TrackRefiner(CameraId camera_id, const Camera& camera,
                            const TrackRefinementOptions& options)
-    : camera_id_(camera_id), camera_(camera), options_(options) {}
+    : camera_id_(camera_id), camera_(camera), options_(options), shading_(options.shading) {
+  if (const auto* stereo = std::get_if<Calibrated<RectifiedStereo>>(&camera)) {
+    focal_ = stereo->params[0];
+  }
+}
 
-void TrackRefiner::remember(const Frame& frame) {
+void TrackRefiner::remember(const MapSnapshot& map, const Frame& frame) {
   if (!options_.enabled || !frame.image) {
     return;
   }
+  if (focal_ > 0) learn_shading(map, frame);
   images_.emplace_back(frame.index, frame.image);
   if (images_.size() > static_cast<std::size_t>(options_.keyframes)) {
     images_.pop_front();
@@ -88,6 +96,9 @@ bool TrackRefiner::find_reference(const MapSnapshot& map, const Landmark& landma
     if (reference.image != nullptr) {
       reference.keyframe = &keyframe;
       reference.keypoint = &keyframe.observations->features.keypoints[observation.keypoint];
+      if (keyframe.observations->has_right(observation.keypoint)) {
+        reference.u_right = keyframe.observations->u_right[observation.keypoint];
+      }
       return true;
     }
   }
@@ -124,26 +135,61 @@ bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landm
   if (!aligned.converged) {
     return false;
   }
-  const auto shift = static_cast<float>(aligned.position.x()) - keypoint.x;
+  const Eigen::Vector2d position =
+      aligned.position + shading_shift(target_from_reference, point_in_reference,
+                                       static_cast<double>(reference.keypoint->scale));
+  const auto shift = static_cast<float>(position.x()) - keypoint.x;
   keypoint.x += shift;
-  keypoint.y = static_cast<float>(aligned.position.y());
-  keypoint.sigma = static_cast<float>(std::ldexp(options_.sigma, patch->level));
+  keypoint.y = static_cast<float>(position.y());
+  keypoint.sigma = std::max(static_cast<float>(options_.min_sigma),
+                            static_cast<float>(options_.sigma) * reference.keypoint->scale);
   if (!frame.features.u_right.empty()) {
     frame.features.u_right[index] += shift;  // the disparity stays
   }
   return true;
 }
 
+// From where the patch is seen to where the ground is: it moved as if it lay deeper.
+Eigen::Vector2d TrackRefiner::shading_shift(const Rigid3d& target_from_reference,
+                                            const Eigen::Vector3d& point_in_reference,
+                                            double scale) const {
+  const double depth =
+      focal_ > 0 ? ShadingCalibrator::relative_depth(shading(), scale / focal_) : 0;
+  if (depth == 0) return Eigen::Vector2d::Zero();
+  const auto ground = project(camera_, target_from_reference * point_in_reference);
+  const auto seen =
+      project(camera_, target_from_reference * Eigen::Vector3d((1 + depth) * point_in_reference));
+  return ground && seen ? Eigen::Vector2d(*ground - *seen) : Eigen::Vector2d::Zero();
+}
+
 int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) const {
-  int refined = 0;
+  frame.aligned.clear();
   if (!options_.enabled || !frame.image) {
-    return refined;
+    return 0;
   }
   for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {
     const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
-    refined += landmark != nullptr && refine_keypoint(map, *landmark, i, frame) ? 1 : 0;
+    if (landmark != nullptr && refine_keypoint(map, *landmark, i, frame)) {
+      frame.aligned.push_back(i);
+    }
   }
-  return refined;
+  return static_cast<int>(frame.aligned.size());
+}
+
+void TrackRefiner::learn_shading(const MapSnapshot& map, const Frame& frame) {
+  const auto& stereo = std::get<Calibrated<RectifiedStereo>>(camera_);
+  std::vector<ShadedTrack> tracks;
+  for (const std::size_t i : frame.aligned) {
+    const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
+    Reference reference;
+    if (landmark == nullptr || !find_reference(map, *landmark, reference)) continue;
+    const Rigid3d& reference_from_world = reference.keyframe->cam_from_world;
+    tracks.push_back(make_shaded_track(stereo, frame.cam_from_world * inverse(reference_from_world),
+                                       *reference.keypoint, reference.u_right,
+                                       frame.features.left.keypoints[i],
+                                       (reference_from_world * landmark->point_in_world).z()));
+  }
+  shading_.add(tracks, shading());
 }
 
 }  // namespace hybrid_slam

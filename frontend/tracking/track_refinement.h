@@ -10,19 +10,21 @@
 #include "frontend/matching/image_pyramid.h"
 #include "frontend/matching/patch_alignment.h"
 #include "frontend/tracking/frame.h"
+#include "frontend/tracking/shading_calibrator.h"
 
 namespace hybrid_slam {
 
 struct TrackRefinementOptions {
   bool enabled = true;
   int keyframes = 30;              // of which the images are kept as references, newest
-  double sigma = 0.15;             // standard deviation of an aligned position [px of its level]
+  double sigma = 0.06;             // standard deviation of an aligned position [keypoint scales]
+  double min_sigma = 0.1;          // and at least this [px]
   double max_view_angle_deg = 35;  // between the two views of a patch
   AlignmentOptions alignment;
+  ShadingCalibratorOptions shading;  // of stereo pairs alone
 
   // Small patches: lamps that move along with the camera shade the ground anew from every place,
-  // and what is large in an image is shifted by that most. Of patches of 15 samples the scale of
-  // two rendered surveys came out 0.08 and 0.25 % too small, of 9 samples 0.05 and 0.11 %.
+  // and what is large in an image is shifted by that most.
   TrackRefinementOptions() { alignment.half_size = 4; }
 
   std::string validate() const;
@@ -30,17 +32,22 @@ struct TrackRefinementOptions {
 
 // Moves the keypoints that were matched to landmarks to where the image looks like the patch around
 // the landmark's first observation: all frames then measure the very same point, to a small part of
-// a pixel, which SIFT's own positions do not.
+// a pixel, which SIFT's own positions do not. A stereo pair's are freed of what its lamps pretend,
+// as far as it is known (see ShadingCalibrator).
 class TrackRefiner {
  public:
   TrackRefiner(CameraId camera_id, const Camera& camera, const TrackRefinementOptions& options);
 
-  // The frame becomes a keyframe: its image can serve as reference.
-  void remember(const Frame& frame);
+  // The frame becomes a keyframe: its image can serve as reference, and its tracks tell of the
+  // shading.
+  void remember(const MapSnapshot& map, const Frame& frame);
 
   // Aligns the frame's matched keypoints, given a pose good to about a pixel. Changes their
   // positions, right coordinates and standard deviations. Returns how many.
   int refine(const MapSnapshot& map, Frame& frame) const;
+
+  // In use now; see ShadingCalibrator.
+  double shading() const { return shading_.depth_per_size(); }
 
  private:
   struct Reference;
@@ -49,10 +56,15 @@ class TrackRefiner {
   bool find_reference(const MapSnapshot& map, const Landmark& landmark, Reference& reference) const;
   bool refine_keypoint(const MapSnapshot& map, const Landmark& landmark, std::size_t index,
                        Frame& frame) const;
+  Eigen::Vector2d shading_shift(const Rigid3d& target_from_reference,
+                                const Eigen::Vector3d& point_in_reference, double scale) const;
+  void learn_shading(const MapSnapshot& map, const Frame& frame);
 
   CameraId camera_id_;
   Camera camera_;
   TrackRefinementOptions options_;
+  double focal_ = 0;  // of a stereo pair [px], else 0
+  ShadingCalibrator shading_;
   std::deque<std::pair<std::int64_t, std::shared_ptr<const ImagePyramid>>>
       images_;  // by frame index, ascending
 };

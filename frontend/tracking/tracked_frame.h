@@ -24,6 +24,7 @@ struct TrackedFrame {
   KeyframeId reference;         // invalid for the frame that starts the map
   Rigid3d cam_from_reference;   // through which the frame follows later corrections
   double disparity_offset = 0;  // [px] found in the rectification and removed
+  double shading = 0;           // that moving lamps pretend, removed; see ShadingCalibrator
   int odometer_inliers = 0;
   int last_frame_inliers = 0;
   int inliers = 0;  // landmarks that agree with the final pose

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backend/map/features.h"
+#include "cameras/camera.h"
+#include "cameras/geometry/rigid3d.h"
+
+namespace hybrid_slam {
+
+struct ShadingCalibratorOptions {
+  bool enabled = true;
+  double prior_sigma = 1.0;       // of the depth per size, before anything was seen
+  double min_significance = 3.0;  // standard deviations from 0 before it is used
+  int min_tracks = 50;            // in a keyframe
+
+  // Empty if the values can be used, else what is wrong.
+  std::string validate() const;
+};
+
+// A landmark's way from one stereo keyframe to another: its parallax against what its disparity in
+// the first one promises.
+struct ShadedTrack {
+  double disparity = 0;  // in the first keyframe [px]
+  double parallax = 0;   // how far the translation between the keyframes moves the point [px]
+  double lag = 0;        // share of the parallax that is missing
+  double size = 0;       // scale of the first keypoint over the focal length [rad]
+  double sigma = 1;      // standard deviation of positions and of the disparity [px]
+};
+
+// `first` and its right coordinate [px], in the first keyframe; NaN gives a track that is not used.
+// `depth`: the landmark's, there [m]. The parallax is fitted to both coordinates of `now`.
+ShadedTrack make_shaded_track(const Calibrated<RectifiedStereo>& camera,
+                              const Rigid3d& now_from_first, const Keypoint& first, double u_right,
+                              const Keypoint& now, double depth);
+
+// Lamps that move along with the cameras shade bumps anew from every place: what is seen of a bump
+// follows the lamp, and moves less through the images than the ground does. It moves as if it lay
+// deeper, by its "shading depth". A stereo pair sees both its images by the same light and is not
+// deceived; so the scale of every motion is, and comes out too small.
+//
+// The shading depth shows as a trend: the larger the keypoints, the more of their parallax is
+// missing. An error of the motion's scale is the same for all sizes, and an offset of the
+// disparities depends on depth; both are eliminated from the tracks of every keyframe. Where
+// nothing moves the light there is no trend. What a trend says of the smallest sizes depends on its
+// law: natural relief is fractal, heights grow with size^H. Spectra of seafloors at these scales
+// have exponents of 3 to 3.5 (Jackson and Richardson, High-Frequency Seafloor Acoustics, 2007),
+// which is H = 0.5 to 0.75; rendered ground lies at the upper end.
+class ShadingCalibrator {
+ public:
+  explicit ShadingCalibrator(const ShadingCalibratorOptions& options);
+
+  // The tracks that end in one keyframe. `corrected`: the depth per size by which their positions
+  // there were corrected.
+  void add(const std::vector<ShadedTrack>& tracks, double corrected);
+
+  // Shading depth over size, of features of one milliradian; 0 as long as it is not significant.
+  double depth_per_size() const;
+  double sigma() const;  // standard deviation of the estimate
+
+  // Shading depth over depth, of features of `size` [rad].
+  static double relative_depth(double depth_per_size, double size);
+
+ private:
+  ShadingCalibratorOptions options_;
+  double information_ = 0;
+  double weighted_sum_ = 0;  // information x depth per size
+};
+
+}  // namespace hybrid_slam
