@@ -9,55 +9,10 @@
 
 #include "frontend/matching/projection_matcher.h"
 #include "frontend/place_recognition/guided_matching.h"
+#include "frontend/place_recognition/loop_side.h"
 
 namespace hybrid_slam {
 namespace {
-
-// One end of a loop.
-struct Side {
-  Side(const MapSnapshot& map, KeyframeId id, const LoopVerifierOptions& options)
-      : keyframe(map.at(id)),
-        camera(map.camera(keyframe)),
-        observations(*keyframe.observations),
-        grid(observations.features.keypoints, image_width(camera), image_height(camera)),
-        keyframes{id} {
-    for (const Covisible& near : map.covisible(id, options.min_shared_landmarks,
-                                               static_cast<std::size_t>(options.neighbours))) {
-      keyframes.push_back(near.id);
-    }
-    for (const KeyframeId near : keyframes) {
-      for (const LandmarkId landmark : map.at(near).landmarks) {
-        if (landmark.valid()) landmarks.push_back(landmark);
-      }
-    }
-    std::sort(landmarks.begin(), landmarks.end());
-    landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
-    metric = knows_scale(map, keyframe, options);
-  }
-
-  // All neighbours count here: the strongest ones of a fisheye, which sees more, are fisheyes.
-  static bool knows_scale(const MapSnapshot& map, const Keyframe& keyframe,
-                          const LoopVerifierOptions& options) {
-    const auto is_pair = [&](KeyframeId id) { return baseline(map.camera(map.at(id))) > 0; };
-    return is_pair(keyframe.id) ||
-           std::any_of(
-               keyframe.covisible.begin(), keyframe.covisible.end(), [&](const Covisible& near) {
-                 return near.shared_landmarks >= options.min_shared_landmarks && is_pair(near.id);
-               });
-  }
-
-  bool knows(LandmarkId id) const {
-    return std::binary_search(landmarks.begin(), landmarks.end(), id);
-  }
-
-  const Keyframe& keyframe;
-  const Camera& camera;
-  const FrameObservations& observations;
-  KeypointGrid grid;
-  std::vector<KeyframeId> keyframes;  // the end itself first
-  std::vector<LandmarkId> landmarks;  // of all of them, ascending
-  bool metric = false;                // it or a neighbour, however weak, is a stereo pair
-};
 
 // A landmark of the newer side at a keypoint of its keyframe, and one of the older side.
 struct Match {
@@ -73,8 +28,8 @@ class Verification {
       : map_(map),
         places_(places),
         options_(options),
-        newer_(map, keyframe, options),
-        older_(map, match, options) {
+        newer_(map, keyframe, options.neighbours, options.min_shared_landmarks),
+        older_(map, match, options.neighbours, options.min_shared_landmarks) {
     options_.pose.with_scale = !newer_.metric || !older_.metric;
   }
 
@@ -124,9 +79,8 @@ class Verification {
   // One neighbour of the keyframe, at least, sees the older side where the loop puts it.
   bool is_confirmed() {
     const Rigid3d world_from_newer = inverse(newer_.keyframe.cam_from_world);
-    for (const KeyframeId id : newer_.keyframes) {
-      if (id == newer_.keyframe.id) continue;
-      const Side neighbour(map_, id, options_);
+    for (const KeyframeId id : newer_.neighbours) {
+      const KeyframeView neighbour(map_, id);
       const Sim3d neighbour_from_newer(neighbour.keyframe.cam_from_world * world_from_newer);
       const Rigid3d pose = without_scale(neighbour_from_newer * newer_from_older_ *
                                          Sim3d(older_.keyframe.cam_from_world));
@@ -160,10 +114,10 @@ class Verification {
   }
 
   std::vector<Match> match_descriptors() const {
-    const auto with_landmarks = [&](const Side& side) {
+    const auto with_landmarks = [&](const KeyframeView& view) {
       DirectIndex index;
-      for (const NodeFeature& entry : places_.index_of(side.keyframe.id)) {
-        if (side.keyframe.landmarks[static_cast<std::size_t>(entry.feature)].valid()) {
+      for (const NodeFeature& entry : places_.index_of(view.keyframe.id)) {
+        if (view.keyframe.landmarks[static_cast<std::size_t>(entry.feature)].valid()) {
           index.push_back(entry);
         }
       }
@@ -190,10 +144,10 @@ class Verification {
     return at != seen.end() && at->keyframe == keyframe ? static_cast<int>(at->keypoint) : -1;
   }
 
-  PoseObservation seen_by(const Side& side, LandmarkId landmark, int index) const {
+  PoseObservation seen_by(const KeyframeView& view, LandmarkId landmark, int index) const {
     const Keypoint& keypoint =
-        side.observations.features.keypoints[static_cast<std::size_t>(index)];
-    return {side.keyframe.cam_from_world * map_.at(landmark).point_in_world,
+        view.observations.features.keypoints[static_cast<std::size_t>(index)];
+    return {view.keyframe.cam_from_world * map_.at(landmark).point_in_world,
             {keypoint.x, keypoint.y, kNoRightMatch},
             std::hypot(static_cast<double>(keypoint.sigma), options_.surroundings_sigma)};
   }
@@ -219,7 +173,7 @@ class Verification {
 
   // Landmarks `ids` in a keyframe at a pose in their world: what lies within the noise of where it
   // is expected. `in_view` (may be null) receives how many are.
-  std::vector<ProjectionMatch> search_in(const Side& side, const Rigid3d& cam_from_world,
+  std::vector<ProjectionMatch> search_in(const KeyframeView& view, const Rigid3d& cam_from_world,
                                          const std::vector<LandmarkId>& ids,
                                          std::size_t* in_view) const {
     ProjectionMatcherOptions matcher;
@@ -228,24 +182,24 @@ class Verification {
     matcher.max_scale_ratio = options_.max_scale_ratio;
     // Its disparities are no guide where the scale is open.
     static const std::vector<float> kNoRight;
-    const FeatureView view{side.camera, side.observations.features,
-                           options_.pose.with_scale ? kNoRight : side.observations.u_right,
-                           side.grid};
+    const FeatureView features{view.camera, view.observations.features,
+                               options_.pose.with_scale ? kNoRight : view.observations.u_right,
+                               view.grid};
     const auto predictions =
-        predict_landmarks(map_, side.camera, cam_from_world, ids, matcher.max_view_angle_deg);
+        predict_landmarks(map_, view.camera, cam_from_world, ids, matcher.max_view_angle_deg);
     if (in_view != nullptr) *in_view = predictions.size();
-    return match_predictions(map_, view, predictions, nullptr, matcher);
+    return match_predictions(map_, features, predictions, nullptr, matcher);
   }
 
-  std::vector<Match> search_older_in(const Side& side, const Rigid3d& cam_from_older_world,
+  std::vector<Match> search_older_in(const KeyframeView& view, const Rigid3d& cam_from_older_world,
                                      std::size_t* in_view) const {
-    const auto found = search_in(side, cam_from_older_world, older_.landmarks, in_view);
+    const auto found = search_in(view, cam_from_older_world, older_.landmarks, in_view);
     std::vector<PoseObservation> seen;
     for (const ProjectionMatch& match : found) {
-      seen.push_back(seen_by(side, match.landmark, match.keypoint));
+      seen.push_back(seen_by(view, match.landmark, match.keypoint));
       seen.back().point_in_world = cam_from_older_world * map_.at(match.landmark).point_in_world;
     }
-    const auto bearings = bearing_observations(side.camera, seen);
+    const auto bearings = bearing_observations(view.camera, seen);
     std::vector<Match> matches;
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (!bearings[i].is_usable() ||
@@ -253,7 +207,7 @@ class Verification {
         continue;
       }
       const auto keypoint = static_cast<std::size_t>(found[i].keypoint);
-      matches.push_back({found[i].keypoint, side.keyframe.landmarks[keypoint], found[i].landmark});
+      matches.push_back({found[i].keypoint, view.keyframe.landmarks[keypoint], found[i].landmark});
     }
     return matches;
   }
@@ -286,8 +240,8 @@ class Verification {
   const MapSnapshot& map_;
   const KeyframeDatabase& places_;
   LoopVerifierOptions options_;
-  Side newer_;
-  Side older_;
+  LoopSide newer_;
+  LoopSide older_;
   Sim3d newer_from_older_;
   std::vector<Match> matches_;
   LoopVerification result_;

@@ -37,7 +37,7 @@ struct LoopVerifierOptions {
   int min_shared_landmarks = 15;  // that make two keyframes neighbours
   // Found among the older side's landmarks that should be in view. A place seen again shows a third
   // and more of them, repeated texture agrees in a patch only.
-  double min_found_share = 0.1;
+  double min_found_share = 0.2;
   int min_confirmations = 15;  // landmarks of the older side, in one neighbour of the keyframe
   RelativePoseOptions pose;
 
