@@ -160,7 +160,6 @@ void fields_of(S section, ShadingCalibratorOptions& options) {
 
 template <typename S>
 void fields_of(S section, TrackRefinementOptions& options) {
-  fields_of(section.section("shading"), options.shading);
   section.field("enabled", options.enabled)
       .field("keyframes", options.keyframes)
       .field("sigma", options.sigma)
@@ -197,6 +196,7 @@ void fields_of(S section, StereoTrackerOptions& options) {
   fields_of(section.section("keyframes"), options.keyframes);
   fields_of(section.section("odometer"), options.odometer);
   fields_of(section.section("disparity"), options.disparity);
+  fields_of(section.section("shading"), options.refinement.shading);
   section.field("min_initial_share", options.min_initial_share)
       .field("close_baselines", options.close_baselines)
       .field("min_new_points", options.min_new_points)
