@@ -64,6 +64,7 @@ ShadingCalibrator calibrated(const Seafloor& ground, std::uint64_t seed, int key
   for (int k = 0; k < keyframes; ++k) {
     const Rigid3d motion = motion_of(k, random);
     std::vector<ShadedTrack> tracks;
+    tracks.reserve(static_cast<std::size_t>(tracks_per_keyframe));
     for (int i = 0; i < tracks_per_keyframe; ++i)
       tracks.push_back(track_of(ground, motion, random));
     calibrator.add(tracks, corrected);
