@@ -31,6 +31,9 @@ double median_distance(const MapSnapshot& map, const Frame& frame) {
 FisheyeTrackerOptions::FisheyeTrackerOptions() {
   keyframes.min_tracked_ratio = 0.5;
   relocalization.min_inliers = 30;
+  // The stereo pair made most landmarks. What the fisheye's first view of one is off by is in all
+  // that are aligned with it, so that more of them do not make the place more certain.
+  refinement.sigma = 0.25;
 }
 
 std::string FisheyeTrackerOptions::validate() const {
