@@ -28,9 +28,9 @@ std::optional<LoopMeasurement> LoopClosing::find(const MapSnapshot& map, Keyfram
   std::optional<LoopMeasurement> loop;
   for (LoopProposal& proposal : finder_.find(map, keyframe)) {
     LoopRecord record;
-    record.keyframe = keyframe;
+    record.keyframe = proposal.keyframe;
     record.match = proposal.match;
-    record.time = time_of(map, keyframe);
+    record.time = time_of(map, proposal.keyframe);
     record.match_time = time_of(map, proposal.match);
     loop = std::exchange(proposal.verification.loop, std::nullopt);
     record.outcome = loop ? "not closed" : to_string(proposal.verification.reason);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,14 +33,24 @@ class LoopFinder {
   LoopFinder(const Vocabulary& vocabulary, const LoopFinderOptions& options);
 
   // To be called once for each new keyframe, in their order. What was examined, best first, up to
-  // and including the first that is a loop. Nothing for a keyframe that has gone, or whose
-  // descriptors the vocabulary does not know.
+  // and including the first that is a loop. Without one, a loop of a keyframe before it that only
+  // missed a neighbour to confirm it, if the new one does. Nothing for a keyframe that has gone, or
+  // whose descriptors the vocabulary does not know.
   std::vector<LoopProposal> find(const MapSnapshot& map, KeyframeId keyframe);
 
  private:
+  struct Ends {
+    KeyframeId keyframe;
+    KeyframeId match;
+  };
+
+  std::optional<LoopProposal> confirm_earlier(const MapSnapshot& map, KeyframeId keyframe);
+
   KeyframeDatabase places_;
   LoopDetector detector_;
   LoopVerifier verifier_;
+  int min_shared_landmarks_;       // that make two keyframes neighbours
+  std::vector<Ends> unconfirmed_;  // of the newest keyframes
 };
 
 }  // namespace hybrid_slam
