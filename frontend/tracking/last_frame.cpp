@@ -10,10 +10,10 @@ void LastFrame::follow(const MapSnapshot& map) {
   }
   if (requested_) {
     const Keyframe* keyframe = map.find_frame(camera_, *requested_);
-    if (keyframe != nullptr && frame_->index == *requested_) {
+    if (keyframe != nullptr && cam_from_requested_) {
       reference_ = keyframe->id;
-      frame_->landmarks = keyframe->landmarks;
-      cam_from_reference_ = Rigid3d();
+      cam_from_reference_ = *cam_from_requested_;
+      if (frame_->index == *requested_) frame_->landmarks = keyframe->landmarks;
     }
     if (map.newest_frame_index(camera_) >= *requested_) {
       requested_.reset();
@@ -32,6 +32,11 @@ void LastFrame::remember(Frame frame, const TrackedFrame& result) {
   if (result.keyframe) {
     requested_ = frame.index;
     keyframe_frame_ = frame.index;
+    cam_from_requested_ = Rigid3d();
+  } else if (cam_from_requested_ && velocity_) {
+    cam_from_requested_ = *velocity_ * *cam_from_requested_;
+  } else {
+    cam_from_requested_.reset();
   }
   if (result.tracked()) {
     reference_ = result.reference;

@@ -38,6 +38,8 @@ class LastFrame {
   Rigid3d cam_from_reference_;
   std::optional<Rigid3d> velocity_;
   std::optional<std::int64_t> requested_;  // frame asked to become a keyframe, not yet seen
+  // Of the last frame, since then; none if tracking was lost between.
+  std::optional<Rigid3d> cam_from_requested_;
   std::int64_t keyframe_frame_ = 0;
 };
 

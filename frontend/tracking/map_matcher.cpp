@@ -54,20 +54,24 @@ FeatureView MapMatcher::view_of(const Frame& frame) const {
   return {camera_, frame.features.left, frame.features.u_right, frame.grid};
 }
 
-int MapMatcher::refine(const MapSnapshot& map, Frame& frame) const {
+int MapMatcher::refine(const MapSnapshot& map, Frame& frame,
+                       std::span<const PoseObservation> others) const {
   std::vector<std::size_t> keypoint;
-  const auto observations = pose_observations(map, frame.features.left, frame.features.u_right,
-                                              frame.landmarks, keypoint);
+  auto observations = pose_observations(map, frame.features.left, frame.features.u_right,
+                                        frame.landmarks, keypoint);
+  observations.insert(observations.end(), others.begin(), others.end());
   const auto refined = refine_pose(camera_, frame.cam_from_world, observations, options_.pose);
   std::vector<LandmarkId> kept(frame.size());
+  int inliers = 0;
   for (std::size_t i = 0; i < keypoint.size(); ++i) {
     if (refined.inlier[i]) {
       kept[keypoint[i]] = frame.landmarks[keypoint[i]];
+      ++inliers;
     }
   }
   frame.landmarks = std::move(kept);
   frame.cam_from_world = refined.cam_from_world;
-  return refined.inliers;
+  return inliers;
 }
 
 int MapMatcher::match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids,

@@ -51,9 +51,10 @@ class MapMatcher {
 
   FeatureView view_of(const Frame& frame) const;
 
-  // Optimises the pose on the landmarks that the frame has and drops those that disagree. Returns
-  // how many are left.
-  int refine(const MapSnapshot& map, Frame& frame) const;
+  // Optimises the pose on the landmarks that the frame has, and on `others`, which the map does not
+  // hold. Drops those that disagree. Returns how many landmarks are left.
+  int refine(const MapSnapshot& map, Frame& frame,
+             std::span<const PoseObservation> others = {}) const;
 
   // Looks for landmarks in windows of `radius` [px] around their projections, instead of those that
   // the frame has. Returns how many were found; nothing is optimised.

@@ -10,6 +10,9 @@
 namespace hybrid_slam {
 namespace {
 
+// Share of what the odometer finds again of the last frame, below which the map shows little.
+constexpr double kFewLandmarks = 0.25;
+
 int count_valid(const std::vector<LandmarkId>& ids) {
   return static_cast<int>(
       std::count_if(ids.begin(), ids.end(), [](LandmarkId id) { return id.valid(); }));
@@ -67,7 +70,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
   result.disparity_offset = frame.u_right_correction;
   result.shading = matcher_.shading();
   if (last_.tracked()) {
-    predict(frame, result);
+    const auto motion = predict(frame, result);
     const Rigid3d predicted = frame.cam_from_world;
     if (!track_last_frame(frame, map, result)) {
       frame.cam_from_world = predicted;
@@ -78,6 +81,9 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
     }
     if (track_local_map(frame, map, options_.min_local_map_inliers, result)) {
       result.source = PoseSource::kLocalMap;
+      if (motion && result.inliers < kFewLandmarks * result.odometer_inliers) {
+        result.inliers = matcher_.refine(map, frame, points_of_last_frame(*motion, frame));
+      }
     } else if (result.odometer_inliers >= options_.min_odometer_inliers) {
       frame.cam_from_world = predicted;
       result.reference = last_.reference();
@@ -122,9 +128,9 @@ void StereoTracker::correct_disparities(Frame& frame) const {
 }
 
 // Odometer and predicted pose; constant velocity, then the last pose, where the odometer fails.
-void StereoTracker::predict(Frame& frame, TrackedFrame& result) {
+std::optional<StereoMotion> StereoTracker::predict(Frame& frame, TrackedFrame& result) {
   const Frame& last = last_.frame();
-  const auto motion = odometer_.estimate(last.features, frame.features);
+  auto motion = odometer_.estimate(last.features, frame.features);
   if (motion) {
     result.prediction = Prediction::kOdometer;
     result.odometer_inliers = static_cast<int>(motion->inliers.size());
@@ -138,6 +144,30 @@ void StereoTracker::predict(Frame& frame, TrackedFrame& result) {
     result.prediction = Prediction::kLastPose;
     frame.cam_from_world = last.cam_from_world;
   }
+  return motion;
+}
+
+// Where the map shows little, as it does where mapping lags behind or at its border, few landmarks
+// along an edge of the image leave the pose loose: turned and shifted at once. What the last frame
+// saw by itself holds it (the temporal points of ORB-SLAM2). Those that are no landmarks.
+std::vector<PoseObservation> StereoTracker::points_of_last_frame(const StereoMotion& motion,
+                                                                 const Frame& frame) const {
+  const Frame& last = last_.frame();
+  const Rigid3d world_from_last = inverse(last.cam_from_world);
+  std::vector<PoseObservation> points;
+  for (const CircularMatch& match : motion.inliers) {
+    const auto i = static_cast<std::size_t>(match.previous);
+    const auto j = static_cast<std::size_t>(match.current);
+    const Keypoint& before = last.features.left.keypoints[i];
+    const Keypoint& now = frame.features.left.keypoints[j];
+    const auto point = triangulate_stereo(camera_, {before.x, before.y, last.features.u_right[i]});
+    if (!point || frame.landmarks[j].valid()) continue;
+    points.push_back(
+        {world_from_last * *point,
+         {now.x, now.y, frame.features.u_right[j]},
+         std::hypot(static_cast<double>(before.sigma), static_cast<double>(now.sigma))});
+  }
+  return points;
 }
 
 bool StereoTracker::track_last_frame(Frame& frame, const MapSnapshot& map,

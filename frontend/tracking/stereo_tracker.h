@@ -48,7 +48,9 @@ class StereoTracker {
  private:
   TrackedFrame initialize(Frame& frame) const;
   void correct_disparities(Frame& frame) const;
-  void predict(Frame& frame, TrackedFrame& result);
+  std::optional<StereoMotion> predict(Frame& frame, TrackedFrame& result);
+  std::vector<PoseObservation> points_of_last_frame(const StereoMotion& motion,
+                                                    const Frame& frame) const;
   bool track_last_frame(Frame& frame, const MapSnapshot& map, TrackedFrame& result) const;
   bool track_reference(Frame& frame, const MapSnapshot& map) const;
   bool track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers,
