@@ -56,8 +56,7 @@ std::optional<LoopProposal> LoopFinder::confirm_earlier(const MapSnapshot& map,
                                                         KeyframeId keyframe) {
   const Keyframe& newest = map.at(keyframe);
   std::erase_if(unconfirmed_, [&](const Ends& ends) {
-    return map.find(ends.keyframe) == nullptr || map.find(ends.match) == nullptr ||
-           shared_landmarks(newest, ends.keyframe) < min_shared_landmarks_;
+    return shared_landmarks(newest, ends.keyframe) < min_shared_landmarks_;
   });
   for (const Ends& ends : unconfirmed_) {
     LoopVerification found = verifier_.verify(map, ends.keyframe, ends.match, places_);

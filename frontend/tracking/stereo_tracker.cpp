@@ -83,6 +83,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
       result.source = PoseSource::kLocalMap;
       if (motion && result.inliers < kFewLandmarks * result.odometer_inliers) {
         result.inliers = matcher_.refine(map, frame, points_of_last_frame(*motion, frame));
+        result.counts.found = valid_ids(frame.landmarks);
       }
     } else if (result.odometer_inliers >= options_.min_odometer_inliers) {
       frame.cam_from_world = predicted;

@@ -294,6 +294,7 @@ TEST_CASE("Where the map shows only an edge of the image, the last frame holds t
     const TrackedFrame tracked = tracker.track(world.frame(at + 1), world.map());
     if (tracked.source != PoseSource::kLocalMap) continue;
     CHECK(tracked.inliers < 0.25 * tracked.odometer_inliers);
+    CHECK(tracked.inliers == static_cast<int>(tracked.counts.found.size()));
     const double error =
         pose_scene::rotation_error(tracked.cam_from_world, world.true_pose(at + 1));
     squared_error += error * error;
