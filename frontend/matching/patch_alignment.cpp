@@ -11,6 +11,7 @@ namespace hybrid_slam {
 namespace {
 
 using Level = ImagePyramid::Level;
+using Samples = Eigen::VectorXf;
 
 // Texture below this has no place: sum of squared gradients per sample [(grey levels / px)^2].
 constexpr double kMinGradientEnergy = 0.5;
@@ -27,8 +28,7 @@ std::array<float, 4> cubic_weights(float t) {
 
 // The samples of a square of whole steps around (cx, cy), row by row: all share the same weights,
 // so that rows and columns can be interpolated one after the other.
-void sample_square(const Level& level, double cx, double cy, int half_size,
-                   std::vector<float>* samples) {
+void sample_square(const Level& level, double cx, double cy, int half_size, Samples* samples) {
   const double x = cx - half_size;
   const double y = cy - half_size;
   const int left = static_cast<int>(x);
@@ -37,8 +37,8 @@ void sample_square(const Level& level, double cx, double cy, int half_size,
   const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top));
   const int side = 2 * half_size + 1;
   std::array<float, 2 * (kMaxHalfSize + 1) + 4> column;  // with the derivatives' rim
-  samples->clear();
-  samples->reserve(static_cast<std::size_t>(side * side));
+  samples->resize(side * side);
+  float* sample = samples->data();
   for (int v = 0; v < side; ++v) {
     const float* p0 = level.row(top - 1 + v) + (left - 1);
     const float* p1 = p0 + level.width;
@@ -49,8 +49,8 @@ void sample_square(const Level& level, double cx, double cy, int half_size,
           wy[0] * p0[u] + wy[1] * p1[u] + wy[2] * p2[u] + wy[3] * p3[u];
     }
     const float* c = column.data();
-    for (int u = 0; u < side; ++u, ++c) {
-      samples->push_back(wx[0] * c[0] + wx[1] * c[1] + wx[2] * c[2] + wx[3] * c[3]);
+    for (int u = 0; u < side; ++u, ++c, ++sample) {
+      *sample = wx[0] * c[0] + wx[1] * c[1] + wx[2] * c[2] + wx[3] * c[3];
     }
   }
 }
@@ -75,17 +75,9 @@ bool inside(const Level& level, double cx, double cy, double rx, double ry) {
   return cx - rx >= 1 && cy - ry >= 1 && cx + rx < level.width - 2 && cy + ry < level.height - 2;
 }
 
-void remove_mean(std::vector<float>* values) {
-  double sum = 0;
-  for (const float v : *values) sum += v;
-  const auto mean = static_cast<float>(sum / static_cast<double>(values->size()));
-  for (float& v : *values) v -= mean;
-}
-
-double dot(const std::vector<float>& a, const std::vector<float>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += static_cast<double>(a[i]) * b[i];
-  return sum;
+template <typename Vector>
+void remove_mean(Vector&& values) {
+  values.array() -= values.mean();
 }
 
 int level_of(double scale, int levels, const AlignmentOptions& options) {
@@ -95,23 +87,25 @@ int level_of(double scale, int levels, const AlignmentOptions& options) {
 
 // The target's samples under the current place, without their mean; false outside the image.
 bool sample_target(const Level& level, int half_size, const Eigen::Matrix2d& warp,
-                   const Eigen::Vector2d& centre, std::vector<float>* samples) {
+                   const Eigen::Vector2d& centre, Samples* samples) {
   const Eigen::Vector2d reach = half_size * warp.cwiseAbs().rowwise().sum();
   if (!inside(level, centre.x(), centre.y(), reach.x(), reach.y())) return false;
   if (warp.isIdentity(0)) {
     sample_square(level, centre.x(), centre.y(), half_size, samples);
-    remove_mean(samples);
+    remove_mean(*samples);
     return true;
   }
-  samples->clear();
+  const int side = 2 * half_size + 1;
+  samples->resize(side * side);
+  float* sample = samples->data();
   for (int v = -half_size; v <= half_size; ++v) {
-    for (int u = -half_size; u <= half_size; ++u) {
+    for (int u = -half_size; u <= half_size; ++u, ++sample) {
       const double x = centre.x() + warp(0, 0) * u + warp(0, 1) * v;
       const double y = centre.y() + warp(1, 0) * u + warp(1, 1) * v;
-      samples->push_back(sample_cubic(level, x, y));
+      *sample = sample_cubic(level, x, y);
     }
   }
-  remove_mean(samples);
+  remove_mean(*samples);
   return true;
 }
 
@@ -122,29 +116,21 @@ class Solver {
   Solver(const ReferencePatch& patch, bool horizontal_only) {
     ReferencePatch::Normal normal = patch.normal;
     if (horizontal_only) hold(ReferencePatch::kShiftY, &normal);
-    const ReferencePatch::Normal inverse = normal.inverse();
-    is_usable_ =
-        inverse.allFinite() && has_place(inverse, patch.columns[0].size(), horizontal_only);
+    ReferencePatch::Normal inverse = normal.inverse();
+    is_usable_ = inverse.allFinite() && has_place(inverse, patch.columns.rows(), horizontal_only);
     if (!is_usable_) return;
-    for (std::size_t i = 0; i < weights_.size(); ++i) {
-      weights_[i].assign(patch.columns[0].size(), 0);
-      if (horizontal_only && i == ReferencePatch::kShiftY) continue;
-      for (std::size_t k = 0; k < patch.columns.size(); ++k) {
-        if (horizontal_only && k == ReferencePatch::kShiftY) continue;
-        const auto share =
-            static_cast<float>(inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)));
-        for (std::size_t p = 0; p < weights_[i].size(); ++p) {
-          weights_[i][p] += share * patch.columns[k][p];
-        }
-      }
+    if (horizontal_only) {
+      inverse.row(ReferencePatch::kShiftY).setZero();
+      inverse.col(ReferencePatch::kShiftY).setZero();
     }
+    weights_.noalias() = patch.columns * inverse.leftCols<3>().cast<float>();
   }
 
   bool is_usable() const { return is_usable_; }
 
   // (shift_x, shift_y, gain).
-  Eigen::Vector3d solve(const std::vector<float>& target) const {
-    return {dot(weights_[0], target), dot(weights_[1], target), dot(weights_[2], target)};
+  Eigen::Vector3d solve(const Samples& target) const {
+    return (weights_.transpose() * target).cast<double>();
   }
 
  private:
@@ -155,7 +141,7 @@ class Solver {
   }
 
   // Whether enough texture is left beside gain, veil and their slopes.
-  static bool has_place(const ReferencePatch::Normal& inverse, std::size_t samples,
+  static bool has_place(const ReferencePatch::Normal& inverse, Eigen::Index samples,
                         bool horizontal_only) {
     const double energy = kMinGradientEnergy * static_cast<double>(samples);
     const double along_x = 1 / inverse(0, 0);
@@ -163,51 +149,48 @@ class Solver {
     return along_x + along_y >= energy;
   }
 
-  std::array<std::vector<float>, 3> weights_;
+  Eigen::Matrix<float, Eigen::Dynamic, 3> weights_;
   bool is_usable_ = false;
 };
 
 // How well the target's samples fit gain * values.
-void judge(const ReferencePatch& patch, const std::vector<float>& target, Alignment* result) {
-  const double tt = dot(target, target);
+void judge(const ReferencePatch& patch, const Samples& target, Alignment* result) {
+  const double tt = target.squaredNorm();
   const double rr = patch.normal(ReferencePatch::kGain, ReferencePatch::kGain);
-  const double tr = dot(target, patch.columns[ReferencePatch::kGain]);
+  const double tr = target.dot(patch.columns.col(ReferencePatch::kGain));
   result->correlation = tt > 0 ? tr / std::sqrt(tt * rr) : 0;
   const double squares = std::max(0.0, tt - tr * tr / rr);
   result->residual = std::sqrt(squares / static_cast<double>(target.size()));
 }
 
 // From samples with a rim of one pixel.
-void fill_columns(const std::vector<float>& samples, int side, ReferencePatch* patch) {
+void fill_columns(const Samples& samples, int side, ReferencePatch* patch) {
   auto& columns = patch->columns;
-  for (auto& column : columns) column.reserve(static_cast<std::size_t>((side - 2) * (side - 2)));
-  for (int v = 1; v < side - 1; ++v) {
-    for (int u = 1; u < side - 1; ++u) {
-      const float* s = samples.data() + v * side + u;
-      columns[ReferencePatch::kShiftX].push_back(0.5F * (s[1] - s[-1]));
-      columns[ReferencePatch::kShiftY].push_back(0.5F * (s[side] - s[-side]));
-      columns[ReferencePatch::kGain].push_back(s[0]);
-    }
-  }
-  remove_mean(&columns[ReferencePatch::kGain]);
+  columns.resize((side - 2) * (side - 2), Eigen::NoChange);
   const int half = patch->half_size;
-  std::size_t i = 0;
+  Eigen::Index i = 0;
   for (int v = -half; v <= half; ++v) {
     for (int u = -half; u <= half; ++u, ++i) {
-      const float value = columns[ReferencePatch::kGain][i];
-      columns[ReferencePatch::kGainX].push_back(value * static_cast<float>(u));
-      columns[ReferencePatch::kGainY].push_back(value * static_cast<float>(v));
-      columns[ReferencePatch::kVeilX].push_back(static_cast<float>(u));
-      columns[ReferencePatch::kVeilY].push_back(static_cast<float>(v));
+      const float* s = samples.data() + (v + half + 1) * side + (u + half + 1);
+      columns(i, ReferencePatch::kShiftX) = 0.5F * (s[1] - s[-1]);
+      columns(i, ReferencePatch::kShiftY) = 0.5F * (s[side] - s[-side]);
+      columns(i, ReferencePatch::kGain) = s[0];
+      columns(i, ReferencePatch::kVeilX) = static_cast<float>(u);
+      columns(i, ReferencePatch::kVeilY) = static_cast<float>(v);
     }
   }
-  for (auto& column : columns) remove_mean(&column);
-  for (int k = 0; k < ReferencePatch::kColumns; ++k) {
-    for (int j = 0; j <= k; ++j) {
-      patch->normal(k, j) = patch->normal(j, k) =
-          dot(columns[static_cast<std::size_t>(k)], columns[static_cast<std::size_t>(j)]);
-    }
+  remove_mean(columns.col(ReferencePatch::kGain));
+  const auto gain = columns.col(ReferencePatch::kGain).array();
+  columns.col(ReferencePatch::kGainX) = gain * columns.col(ReferencePatch::kVeilX).array();
+  columns.col(ReferencePatch::kGainY) = gain * columns.col(ReferencePatch::kVeilY).array();
+  for (const auto k : {ReferencePatch::kShiftX, ReferencePatch::kShiftY, ReferencePatch::kGainX,
+                       ReferencePatch::kGainY}) {
+    remove_mean(columns.col(k));
   }
+  // In double: what is sought is a small difference between columns that are much alike.
+  const Eigen::Matrix<double, Eigen::Dynamic, ReferencePatch::kColumns> exact =
+      columns.cast<double>();
+  patch->normal.noalias() = exact.transpose() * exact;
 }
 
 }  // namespace
@@ -234,10 +217,10 @@ std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, do
   if (!inside(level, cx, cy, half + 1, half + 1)) return std::nullopt;
 
   const int side = 2 * half + 3;  // one more all around for the derivatives
-  std::vector<float> samples;
+  Samples samples;
   sample_square(level, cx, cy, half + 1, &samples);
   fill_columns(samples, side, &patch);
-  const double energy = kMinGradientEnergy * static_cast<double>(patch.columns[0].size());
+  const double energy = kMinGradientEnergy * static_cast<double>(patch.columns.rows());
   if (patch.normal(0, 0) + patch.normal(1, 1) < energy) return std::nullopt;
   return patch;
 }
@@ -261,7 +244,7 @@ Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
   if (!solver.is_usable()) return result;
   const Eigen::Vector2d first = start / pixel;
   Eigen::Vector2d centre = first;
-  std::vector<float> samples;
+  Samples samples;
   for (int i = 0; i < options.max_iterations; ++i) {
     if (!sample_target(level, patch.half_size, warp, centre, &samples)) return result;
     const Eigen::Vector3d solution = solver.solve(samples);

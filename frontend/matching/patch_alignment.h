@@ -1,9 +1,7 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <Eigen/Core>
 
@@ -34,7 +32,7 @@ struct ReferencePatch {
   // does).
   enum Column { kShiftX, kShiftY, kGain, kGainX, kGainY, kVeilX, kVeilY, kColumns };
   using Normal = Eigen::Matrix<double, kColumns, kColumns>;
-  std::array<std::vector<float>, kColumns> columns;
+  Eigen::Matrix<float, Eigen::Dynamic, kColumns> columns;
   Normal normal;  // of the columns
 };
 
