@@ -97,12 +97,14 @@ class WrittenSection {
 
 // What there is to be set, for both kinds of section.
 template <typename S>
-void fields_of(S section, SiftOptions& options) {
+void fields_of(S section, SiftOptions& options, Upsampling& upsampling) {
   section.field("octave_layers", options.octave_layers)
       .field("contrast_threshold", options.contrast_threshold)
       .field("edge_threshold", options.edge_threshold)
       .field("initial_sigma", options.initial_sigma)
-      .field("upsample", options.upsample)
+      .choice("upsample",
+              {{"auto", Upsampling::kAuto}, {"true", Upsampling::kOn}, {"false", Upsampling::kOff}},
+              upsampling)
       .field("keypoint_sigma", options.keypoint_sigma)
       .refuse_unknown();
 }
@@ -121,12 +123,15 @@ void fields_of(S section, StereoMatcherOptions& options) {
 
 template <typename S>
 void fields_of(S section, KeyframePolicyOptions& options) {
-  section.field("min_tracked_ratio", options.min_tracked_ratio)
+  section.field("min_overlap", options.min_overlap)
+      .field("max_new_ground", options.max_new_ground)
+      .field("min_tracked_ratio", options.min_tracked_ratio)
       .field("min_tracked_ratio_young", options.min_tracked_ratio_young)
       .field("min_inliers", options.min_inliers)
       .field("min_close_tracked", options.min_close_tracked)
       .field("min_close_untracked", options.min_close_untracked)
       .field("max_frames_between", options.max_frames_between)
+      .field("max_seconds_between", options.max_seconds_between)
       .field("min_motion", options.min_motion)
       .refuse_unknown();
 }
@@ -216,6 +221,7 @@ void fields_of(S section, FisheyeTrackerOptions& options) {
       .field("min_tracked_ratio", options.keyframes.min_tracked_ratio)
       .field("min_inliers", options.keyframes.min_inliers)
       .field("max_frames_between", options.keyframes.max_frames_between)
+      .field("max_seconds_between", options.keyframes.max_seconds_between)
       .field("min_motion", options.keyframes.min_motion)
       .refuse_unknown();
   section.refuse_unknown();
@@ -303,7 +309,7 @@ void fields_of(S section, BackendOptions& options) {
 
 template <typename S>
 void fields_of(S top, SlamOptions& options) {
-  fields_of(top.section("sift"), options.sift);
+  fields_of(top.section("sift"), options.sift, options.upsampling);
   fields_of(top.section("stereo"), options.stereo);
   fields_of(top.section("tracking"), options.tracking);
   fields_of(top.section("fisheye"), options.fisheye);
@@ -319,6 +325,7 @@ void fields_of(S top, SlamOptions& options) {
 
 void SlamOptions::distribute() {
   sift.max_features = features;
+  sift.upsample = upsampling != Upsampling::kOff;
   for (TrackerOptions* tracker :
        {static_cast<TrackerOptions*>(&tracking), static_cast<TrackerOptions*>(&fisheye.tracking)}) {
     tracker->max_features = features;

@@ -80,7 +80,7 @@ TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, Keyframe
                                   frame.landmarks,
                                   {},
                                   result.reference};
-    matcher_.remember_keyframe(map, frame);
+    matcher_.remember_keyframe(frame);
   }
   last_.remember(std::move(frame), result);
   return result;
@@ -109,6 +109,7 @@ bool FisheyeTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   evidence.reference_landmarks = count_well_founded(map, result.reference);
   evidence.close_tracked = options_.max_features;  // a single camera makes no close points
   evidence.frames_since_keyframe = static_cast<int>(frame.index - last_.keyframe_frame());
+  evidence.seconds_since_keyframe = frame.time - last_.keyframe_time();
   evidence.keyframes = map.keyframe_count();
   evidence.motion = result.cam_from_reference.translation().norm() / median_distance(map, frame);
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);

@@ -7,8 +7,15 @@ namespace hybrid_slam {
 Frame make_frame(std::int64_t index, double time, StereoFeatures features, int width, int height) {
   KeypointGrid grid(features.left.keypoints, width, height);
   const std::size_t size = features.left.size();
-  return {index,   time, std::move(features), std::move(grid),
-          nullptr, 0,    Rigid3d(),           std::vector<LandmarkId>(size)};
+  return {.index = index,
+          .time = time,
+          .features = std::move(features),
+          .grid = std::move(grid),
+          .image = nullptr,
+          .cam_from_world = Rigid3d(),
+          .landmarks = std::vector<LandmarkId>(size),
+          .width = width,
+          .height = height};
 }
 
 Frame make_mono_frame(std::int64_t index, double time, FeatureSet features, int width, int height) {

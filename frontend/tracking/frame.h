@@ -27,6 +27,8 @@ struct Frame {
   Rigid3d cam_from_world;
   std::vector<LandmarkId> landmarks;   // one per keypoint; invalid where there is none
   std::vector<std::size_t> aligned{};  // keypoints whose positions TrackRefiner moved
+  int width = 0;                       // of the (left) image [px]
+  int height = 0;
 
   std::size_t size() const { return features.left.size(); }
 };

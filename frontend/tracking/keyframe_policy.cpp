@@ -7,9 +7,12 @@ std::string KeyframePolicyOptions::validate() const {
   if (!is_share(min_tracked_ratio) || !is_share(min_tracked_ratio_young)) {
     return "keyframes: tracked ratios must lie in (0, 1]";
   }
+  if (!(min_overlap >= 0 && min_overlap <= 1) || !(max_new_ground >= 0 && max_new_ground <= 1)) {
+    return "keyframes: min_overlap and max_new_ground must lie in [0, 1]";
+  }
   if (min_inliers < 0 || !(min_close_tracked >= 0) || min_close_untracked < 0 ||
-      max_frames_between < 1 || !(min_motion >= 0)) {
-    return "keyframes: counts and shares must not be negative, max_frames_between at least 1";
+      max_frames_between < 0 || !(max_seconds_between >= 0) || !(min_motion >= 0)) {
+    return "keyframes: counts, times and shares must not be negative";
   }
   return {};
 }
@@ -27,9 +30,13 @@ bool needs_keyframe(const KeyframeEvidence& evidence, int max_features,
   const bool weak = evidence.inliers < min_ratio * evidence.reference_landmarks;
   const bool needs_close = evidence.close_tracked < options.min_close_tracked * max_features &&
                            evidence.close_untracked > options.min_close_untracked;
-  const bool due = evidence.frames_since_keyframe >= options.max_frames_between &&
-                   evidence.motion > options.min_motion;
-  return weak || needs_close || due;
+  const bool has_moved_on =
+      evidence.overlap < options.min_overlap || evidence.new_ground > options.max_new_ground;
+  const bool is_late = (options.max_frames_between > 0 &&
+                        evidence.frames_since_keyframe >= options.max_frames_between) ||
+                       (options.max_seconds_between > 0 &&
+                        evidence.seconds_since_keyframe >= options.max_seconds_between);
+  return has_moved_on || weak || needs_close || (is_late && evidence.motion > options.min_motion);
 }
 
 }  // namespace hybrid_slam

@@ -32,6 +32,7 @@ void LastFrame::remember(Frame frame, const TrackedFrame& result) {
   if (result.keyframe) {
     requested_ = frame.index;
     keyframe_frame_ = frame.index;
+    keyframe_time_ = frame.time;
     cam_from_requested_ = Rigid3d();
   } else if (cam_from_requested_ && velocity_) {
     cam_from_requested_ = *velocity_ * *cam_from_requested_;

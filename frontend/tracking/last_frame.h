@@ -26,6 +26,7 @@ class LastFrame {
   KeyframeId reference() const { return reference_; }  // of the last tracked frame
   bool waits_for_keyframe() const { return requested_.has_value(); }
   std::int64_t keyframe_frame() const { return keyframe_frame_; }  // that last became a keyframe
+  double keyframe_time() const { return keyframe_time_; }          // [s] of that one
 
   // current_from_previous of the last step; none unless both frames were tracked.
   const std::optional<Rigid3d>& velocity() const { return velocity_; }
@@ -41,6 +42,7 @@ class LastFrame {
   // Of the last frame, since then; none if tracking was lost between.
   std::optional<Rigid3d> cam_from_requested_;
   std::int64_t keyframe_frame_ = 0;
+  double keyframe_time_ = 0;
 };
 
 }  // namespace hybrid_slam

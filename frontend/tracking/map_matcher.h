@@ -80,8 +80,11 @@ class MapMatcher {
                   Frame& frame) const;
 
   // The frame becomes a keyframe: its image can serve as a reference.
-  void remember_keyframe(const MapSnapshot& map, const Frame& frame) {
-    refiner_.remember(map, frame);
+  void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }
+
+  // See TrackRefiner.
+  void learn_shading(const MapSnapshot& map, const Frame& frame) {
+    refiner_.learn_shading(map, frame);
   }
 
   // See TrackRefiner.

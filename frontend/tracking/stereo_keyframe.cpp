@@ -16,6 +16,23 @@ std::optional<Eigen::Vector3d> point_in_cam(const Camera& camera, const Frame& f
   return triangulate_stereo(camera, {left.x, left.y, frame.features.u_right[keypoint]});
 }
 
+bool in_view(const Camera& camera, const Frame& frame, const Eigen::Vector3d& point_in_cam) {
+  const auto pixel = project(camera, point_in_cam);
+  return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= frame.width - 1 &&
+         pixel->y() <= frame.height - 1;
+}
+
+template <typename Visit>
+void for_each_well_founded(const MapSnapshot& map, KeyframeId id, const Visit& visit) {
+  const Keyframe* keyframe = map.find(id);
+  if (keyframe == nullptr) return;
+  const std::size_t min_observations = map.keyframe_count() <= 2 ? 1 : 2;
+  for (const LandmarkId landmark : keyframe->landmarks) {
+    const Landmark* found = landmark.valid() ? map.find(landmark) : nullptr;
+    if (found != nullptr && found->observations.size() >= min_observations) visit(*found);
+  }
+}
+
 }  // namespace
 
 std::optional<StereoCoverage> stereo_coverage(const Camera& camera, const Frame& frame,
@@ -42,17 +59,30 @@ std::optional<StereoCoverage> stereo_coverage(const Camera& camera, const Frame&
 }
 
 int count_well_founded(const MapSnapshot& map, KeyframeId id) {
-  const Keyframe* keyframe = map.find(id);
-  if (keyframe == nullptr) {
-    return 0;
-  }
-  const std::size_t min_observations = map.keyframe_count() <= 2 ? 1 : 2;
   int count = 0;
-  for (const LandmarkId landmark : keyframe->landmarks) {
-    const Landmark* found = landmark.valid() ? map.find(landmark) : nullptr;
-    count += found != nullptr && found->observations.size() >= min_observations ? 1 : 0;
-  }
+  for_each_well_founded(map, id, [&](const Landmark&) { ++count; });
   return count;
+}
+
+ReferenceOverlap reference_overlap(const MapSnapshot& map, KeyframeId reference,
+                                   const Camera& camera, const Frame& frame) {
+  ReferenceOverlap overlap;
+  for_each_well_founded(map, reference, [&](const Landmark& landmark) {
+    ++overlap.landmarks;
+    overlap.in_view +=
+        in_view(camera, frame, frame.cam_from_world * landmark.point_in_world) ? 1 : 0;
+  });
+  const Rigid3d reference_from_frame =
+      map.cam_from_world(reference) * inverse(frame.cam_from_world);
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const auto point = point_in_cam(camera, frame, i);
+    if (!point) continue;
+    ++overlap.points;
+    overlap.new_points +=
+        !frame.landmarks[i].valid() && !in_view(camera, frame, reference_from_frame * *point) ? 1
+                                                                                              : 0;
+  }
+  return overlap;
 }
 
 NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,

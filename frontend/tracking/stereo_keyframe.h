@@ -22,6 +22,19 @@ std::optional<StereoCoverage> stereo_coverage(const Camera& camera, const Frame&
 // Landmarks of a keyframe that enough others have seen to be relied on; 0 if it has been culled.
 int count_well_founded(const MapSnapshot& map, KeyframeId keyframe);
 
+// What a frame and its reference keyframe see of each other's ground, found again or not.
+struct ReferenceOverlap {
+  int landmarks = 0;   // well-founded ones of the reference
+  int in_view = 0;     // of these, inside the frame's image
+  int points = 0;      // of the frame, with depth
+  int new_points = 0;  // of these, without a landmark and outside the reference's image
+
+  double share() const { return landmarks == 0 ? 0 : static_cast<double>(in_view) / landmarks; }
+  double new_ground() const { return points == 0 ? 0 : static_cast<double>(new_points) / points; }
+};
+ReferenceOverlap reference_overlap(const MapSnapshot& map, KeyframeId reference,
+                                   const Camera& camera, const Frame& frame);
+
 // The frame as a keyframe with its landmarks. Of the keypoints with depth and without a landmark,
 // every close one makes a new point, and at least the `min_new_points` nearest do.
 NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,

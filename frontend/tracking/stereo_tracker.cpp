@@ -222,10 +222,14 @@ bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   }
   KeyframeEvidence evidence;
   evidence.inliers = result.inliers;
-  evidence.reference_landmarks = count_well_founded(map, result.reference);
+  const ReferenceOverlap overlap = reference_overlap(map, result.reference, camera_, frame);
+  evidence.reference_landmarks = overlap.landmarks;
+  evidence.overlap = overlap.share();
+  evidence.new_ground = overlap.new_ground();
   evidence.close_tracked = coverage->close_tracked;
   evidence.close_untracked = coverage->close_untracked;
   evidence.frames_since_keyframe = static_cast<int>(frame.index - last_.keyframe_frame());
+  evidence.seconds_since_keyframe = frame.time - last_.keyframe_time();
   evidence.keyframes = map.keyframe_count();
   evidence.motion = result.cam_from_reference.translation().norm() / coverage->median_depth;
   evidence.by_odometry = result.source == PoseSource::kOdometer;
@@ -243,9 +247,8 @@ int StereoTracker::share_of_features(const Frame& frame, double share) const {
 }
 
 TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, TrackedFrame result) {
-  if (result.keyframe) {
-    matcher_.remember_keyframe(map, frame);
-  }
+  if (result.tracked()) matcher_.learn_shading(map, frame);
+  if (result.keyframe) matcher_.remember_keyframe(frame);
   last_.remember(std::move(frame), result);
   return result;
 }

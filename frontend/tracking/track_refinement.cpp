@@ -8,6 +8,11 @@
 namespace hybrid_slam {
 namespace {
 
+// Between two frames that tell of the shading, over the scene's median depth: a landmark lasts for
+// about half of a view, as wide as the scene is deep, and so tells five times (the share of a track
+// that ShadingCalibrator counts).
+constexpr double kLearningStep = 0.1;
+
 // Pixel offsets between two views of a small plane at a point, seen head-on by the reference: what
 // a step of one reference pixel becomes in the target.
 std::optional<Eigen::Matrix2d> patch_warp(const Camera& camera,
@@ -66,11 +71,10 @@ TrackRefiner::TrackRefiner(CameraId camera_id, const Camera& camera,
   }
 }
 
-void TrackRefiner::remember(const MapSnapshot& map, const Frame& frame) {
+void TrackRefiner::remember(const Frame& frame) {
   if (!options_.enabled || !frame.image) {
     return;
   }
-  if (focal_ > 0) learn_shading(map, frame);
   images_.emplace_back(frame.index, frame.image);
   if (images_.size() > static_cast<std::size_t>(options_.keyframes)) {
     images_.pop_front();
@@ -177,18 +181,27 @@ int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) const {
 }
 
 void TrackRefiner::learn_shading(const MapSnapshot& map, const Frame& frame) {
+  if (focal_ == 0 || frame.aligned.empty()) return;
+  const Eigen::Vector3d place = inverse(frame.cam_from_world).translation();
   const auto& stereo = std::get<Calibrated<RectifiedStereo>>(camera_);
   std::vector<ShadedTrack> tracks;
+  std::vector<double> depths;
   for (const std::size_t i : frame.aligned) {
     const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
     Reference reference;
     if (landmark == nullptr || !find_reference(map, *landmark, reference)) continue;
     const Rigid3d& reference_from_world = reference.keyframe->cam_from_world;
+    depths.push_back((frame.cam_from_world * landmark->point_in_world).z());
     tracks.push_back(make_shaded_track(stereo, frame.cam_from_world * inverse(reference_from_world),
                                        *reference.keypoint, reference.u_right,
                                        frame.features.left.keypoints[i],
                                        (reference_from_world * landmark->point_in_world).z()));
   }
+  if (depths.empty()) return;
+  const auto middle = depths.begin() + static_cast<long>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  if (learnt_at_ && (place - *learnt_at_).norm() < kLearningStep * *middle) return;
+  learnt_at_ = place;
   shading_.add(tracks, shading());
 }
 

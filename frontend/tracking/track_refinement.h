@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -38,9 +39,12 @@ class TrackRefiner {
  public:
   TrackRefiner(CameraId camera_id, const Camera& camera, const TrackRefinementOptions& options);
 
-  // The frame becomes a keyframe: its image can serve as reference, and its tracks tell of the
-  // shading.
-  void remember(const MapSnapshot& map, const Frame& frame);
+  // The frame becomes a keyframe: its image can serve as reference.
+  void remember(const Frame& frame);
+
+  // Looks at a tracked frame for what its tracks tell of the shading, if it is far enough from the
+  // last one that was looked at for its tracks to be others.
+  void learn_shading(const MapSnapshot& map, const Frame& frame);
 
   // Aligns the frame's matched keypoints, given a pose good to about a pixel. Changes their
   // positions, right coordinates and standard deviations. Returns how many.
@@ -58,13 +62,13 @@ class TrackRefiner {
                        Frame& frame) const;
   Eigen::Vector2d shading_shift(const Rigid3d& target_from_reference,
                                 const Eigen::Vector3d& point_in_reference, double scale) const;
-  void learn_shading(const MapSnapshot& map, const Frame& frame);
 
   CameraId camera_id_;
   Camera camera_;
   TrackRefinementOptions options_;
   double focal_ = 0;  // of a stereo pair [px], else 0
   ShadingCalibrator shading_;
+  std::optional<Eigen::Vector3d> learnt_at_;  // where the last frame that was looked at stood
   std::deque<std::pair<std::int64_t, std::shared_ptr<const ImagePyramid>>>
       images_;  // by frame index, ascending
 };

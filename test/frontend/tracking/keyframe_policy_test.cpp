@@ -11,9 +11,12 @@ KeyframeEvidence quiet() {
   KeyframeEvidence evidence;
   evidence.inliers = 400;
   evidence.reference_landmarks = 500;
+  evidence.overlap = 0.95;
+  evidence.new_ground = 0.05;
   evidence.close_tracked = 300;
   evidence.close_untracked = 30;
   evidence.frames_since_keyframe = 5;
+  evidence.seconds_since_keyframe = 1;
   evidence.keyframes = 10;
   evidence.motion = 0.1;
   return evidence;
@@ -27,20 +30,12 @@ TEST_CASE("When a frame becomes a keyframe") {
   };
   const Row rows[] = {
       {"nothing to gain", [](KeyframeEvidence&) {}, false},
-      {"share tracked just above 0.75", [](KeyframeEvidence& e) { e.inliers = 376; }, false},
-      {"share tracked just below 0.75", [](KeyframeEvidence& e) { e.inliers = 374; }, true},
-      {"a young map bears 0.4",
-       [](KeyframeEvidence& e) {
-         e.keyframes = 1;
-         e.inliers = 201;
-       },
-       false},
-      {"but not less",
-       [](KeyframeEvidence& e) {
-         e.keyframes = 1;
-         e.inliers = 199;
-       },
-       true},
+      {"share tracked just above 0.33", [](KeyframeEvidence& e) { e.inliers = 166; }, false},
+      {"share tracked just below 0.33", [](KeyframeEvidence& e) { e.inliers = 164; }, true},
+      {"overlap just above 0.85", [](KeyframeEvidence& e) { e.overlap = 0.851; }, false},
+      {"overlap just below 0.85", [](KeyframeEvidence& e) { e.overlap = 0.849; }, true},
+      {"new ground just below 0.15", [](KeyframeEvidence& e) { e.new_ground = 0.149; }, false},
+      {"new ground just above 0.15", [](KeyframeEvidence& e) { e.new_ground = 0.151; }, true},
       {"hardly tracked at all", [](KeyframeEvidence& e) { e.inliers = 15; }, false},
       {"just tracked", [](KeyframeEvidence& e) { e.inliers = 16; }, true},
       {"few close points, many to be had",
@@ -61,10 +56,12 @@ TEST_CASE("When a frame becomes a keyframe") {
          e.close_untracked = 500;
        },
        false},
-      {"long ago and moving", [](KeyframeEvidence& e) { e.frames_since_keyframe = 15; }, true},
+      {"many frames ago, but not long", [](KeyframeEvidence& e) { e.frames_since_keyframe = 1000; },
+       false},
+      {"long ago and moving", [](KeyframeEvidence& e) { e.seconds_since_keyframe = 5; }, true},
       {"long ago and standing",
        [](KeyframeEvidence& e) {
-         e.frames_since_keyframe = 100;
+         e.seconds_since_keyframe = 100;
          e.motion = 0.019;
        },
        false},
@@ -83,6 +80,18 @@ TEST_CASE("When a frame becomes a keyframe") {
   }
 }
 
+TEST_CASE("A limit in frames holds where it is asked for, and a young map has a ratio of its own") {
+  KeyframePolicyOptions options;
+  options.max_frames_between = 5;
+  CHECK(needs_keyframe(quiet(), 2000, options));
+  options.max_frames_between = 6;
+  CHECK_FALSE(needs_keyframe(quiet(), 2000, options));
+  options.min_tracked_ratio_young = 0.9;
+  KeyframeEvidence young = quiet();
+  young.keyframes = 1;
+  CHECK(needs_keyframe(young, 2000, options));
+}
+
 TEST_CASE("Keyframe options out of range are refused") {
   CHECK(KeyframePolicyOptions{}.validate().empty());
   for (const double ratio : {0.0, 1.1, std::numeric_limits<double>::quiet_NaN()}) {
@@ -90,8 +99,15 @@ TEST_CASE("Keyframe options out of range are refused") {
     options.min_tracked_ratio = ratio;
     CHECK(!options.validate().empty());
   }
+  for (double KeyframePolicyOptions::*const share :
+       {&KeyframePolicyOptions::min_overlap, &KeyframePolicyOptions::max_new_ground,
+        &KeyframePolicyOptions::max_seconds_between}) {
+    KeyframePolicyOptions options;
+    options.*share = -0.1;
+    CHECK(!options.validate().empty());
+  }
   KeyframePolicyOptions options;
-  options.max_frames_between = 0;
+  options.max_frames_between = -1;
   CHECK(!options.validate().empty());
 }
 

@@ -64,6 +64,10 @@ struct World {
     StereoTrackerOptions options;
     options.max_features = 800;
     options.last_frame_radius = radius;
+    options.keyframes.min_overlap = 0;  // late: so that a keyframe brings many new points
+    options.keyframes.max_new_ground = 1;
+    options.keyframes.min_tracked_ratio = 0.75;
+    options.keyframes.min_tracked_ratio_young = 0.4;
     return {CameraId(0), camera(), options};
   }
   const MapSnapshot& map() const { return filled.map.view(); }

@@ -106,7 +106,7 @@ struct Wall {
 double refined_error(const TrackRefinementOptions& options) {
   Wall wall;
   TrackRefiner refiner(wall.camera_id, camera(), options);
-  refiner.remember(wall.map.view(), wall.first);
+  refiner.remember(wall.first);
   const auto before = wall.second.features;
   const int refined = refiner.refine(wall.map.view(), wall.second);
   CHECK(refined > 0.9 * static_cast<double>(wall.second.size()));
@@ -135,14 +135,21 @@ TEST_CASE("Matched keypoints move to where their landmark's first view looks the
   CHECK(refined_error(options) < 0.05);
 }
 
-TEST_CASE("What moving lamps pretend is learnt from keyframes and taken out") {
+// A frame of another place, with a single track: it tells nothing, but what comes then is news.
+Frame elsewhere(Frame frame) {
+  frame.cam_from_world = Rigid3d(Eigen::Quaterniond::Identity(), {kDepth, 0, 0});
+  frame.aligned.resize(1);
+  return frame;
+}
+
+TEST_CASE("What moving lamps pretend is learnt from frames apart and taken out") {
   const Wall wall(true);
   TrackRefinementOptions options;
   options.shading.prior_sigma = 100;
   options.keyframes = 100;
   options.alignment.half_size = 7;
   TrackRefiner refiner(wall.camera_id, camera(), options);
-  refiner.remember(wall.map.view(), wall.first);
+  refiner.remember(wall.first);
   const auto error = [&](Frame frame) {  // along the motion, mean [px]
     refiner.refine(wall.map.view(), frame);
     double sum = 0;
@@ -154,12 +161,17 @@ TEST_CASE("What moving lamps pretend is learnt from keyframes and taken out") {
   };
   CHECK(error(wall.second) == Approx(-5.3 * (0.02 + 0.0004 * 120)).margin(0.02));
   CHECK(refiner.shading() == 0);
-  for (int i = 0; i < 30; ++i) {
+  const auto learn = [&] {
     Frame frame = wall.second;
     refiner.refine(wall.map.view(), frame);
-    frame.index = 2 + i;
-    refiner.remember(wall.map.view(), frame);
-  }
+    refiner.learn_shading(wall.map.view(), frame);
+    return frame;
+  };
+  learn();
+  const double once = refiner.shading();
+  for (int i = 0; i < 30; ++i) learn();
+  CHECK(refiner.shading() == once);  // it hovers: one frame, thirty times
+  for (int i = 0; i < 30; ++i) refiner.learn_shading(wall.map.view(), elsewhere(learn()));
   CHECK(refiner.shading() == Approx(kShading).epsilon(0.15));
   CHECK(error(wall.second) == Approx(0).margin(0.06));
 }
@@ -178,14 +190,14 @@ TEST_CASE("Without the image of a first view nothing moves") {
   TrackRefinementOptions one;
   one.keyframes = 1;  // a later keyframe's image displaces the first one's
   TrackRefiner forgetful(wall.camera_id, camera(), one);
-  forgetful.remember(wall.map.view(), wall.first);
-  forgetful.remember(wall.map.view(), wall.second);
+  forgetful.remember(wall.first);
+  forgetful.remember(wall.second);
   unchanged(forgetful);
 
   TrackRefinementOptions off;
   off.enabled = false;
   TrackRefiner disabled(wall.camera_id, camera(), off);
-  disabled.remember(wall.map.view(), wall.first);
+  disabled.remember(wall.first);
   unchanged(disabled);
 }
 
