@@ -50,7 +50,7 @@ Map starting_map(const CommandLine& line) {
   return map;
 }
 
-int run(const CommandLine& line, const Interrupt& interrupt) {
+int run(CommandLine line, const Interrupt& interrupt) {
   RunOptions options;
   Map map = starting_map(line);
   if (!line.vocabulary.empty()) {
@@ -86,15 +86,17 @@ int run(const CommandLine& line, const Interrupt& interrupt) {
   options.checkpoint_every = line.checkpoint_every;
   options.localize = line.localize;
 
-  const ImageFrameSource source(*sequence, line.options, line.device);
   const auto start = std::chrono::steady_clock::now();
+  const UpsamplingEvidence upsampling = choose_upsampling(*sequence, line.options);
+  const ImageFrameSource source(*sequence, line.options, line.device);
   const RunResult result =
       line.mode == RunMode::kRealtime
           ? run_realtime(source, line.options, options, hooks, std::move(map))
           : run_every_frame(source, line.options, options, hooks, std::move(map));
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   progress.finish();
-  const RunSummary summary = write_outputs(line, sequence->info(), result, elapsed.count());
+  const RunSummary summary =
+      write_outputs(line, sequence->info(), upsampling, result, elapsed.count());
   print_summary(line, result, summary);
   if (!result.internal_errors.empty()) {
     spdlog::critical(result.internal_errors.back());
@@ -120,12 +122,12 @@ int guarded_main(int argc, char** argv) {
   spdlog::set_pattern("%n: %^%l%$: %v");
   try {
     int exit_code = kExitOk;
-    const auto line = parse_command_line(argc, argv, exit_code);
+    auto line = parse_command_line(argc, argv, exit_code);
     if (!line) {
       return exit_code;
     }
     const Interrupt interrupt;
-    return run(*line, interrupt);
+    return run(std::move(*line), interrupt);
   } catch (const InputError& error) {
     spdlog::error(error.what());
     return kExitBadInput;

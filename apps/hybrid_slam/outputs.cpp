@@ -144,7 +144,15 @@ Json fisheye_json(const RunResult& result, const RunSummary& summary) {
   return json;
 }
 
-Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const RunResult& result,
+Json to_json(const UpsamplingEvidence& evidence, bool upsample) {
+  return {{"on", upsample},
+          {"chosen_by", evidence.chosen_by},
+          {"features", evidence.features},
+          {"feature_size_mrad", 1e3 * evidence.feature_size}};
+}
+
+Json summary_json(const CommandLine& line, const SequenceInfo& sequence,
+                  const UpsamplingEvidence& upsampling, const RunResult& result,
                   const RunSummary& summary) {
   const FrameCounts& frames = result.frames;
   Json json;
@@ -172,6 +180,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   json["ate"] = summary.ate ? to_json(*summary.ate) : Json();
   json["truth_convention"] =
       sequence.truth_convention.empty() ? Json() : Json(sequence.truth_convention);
+  json["upsampling"] = to_json(upsampling, line.options.sift.upsample);
   json["options"] = options_json(line, sequence.fisheye.has_value());
   json["seed"] = line.options.seed;
   json["sift_engine"] = to_string(line.device);
@@ -189,7 +198,8 @@ void write_map(const CommandLine& line, const MapSnapshot& map) {
 }
 
 RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
-                         const RunResult& result, double seconds) {
+                         const UpsamplingEvidence& upsampling, const RunResult& result,
+                         double seconds) {
   const std::filesystem::path out = line.out;
   const Trajectories stereo = collect(result, result.records);
   const Trajectories fisheye = collect(result, result.fisheye_records);
@@ -208,7 +218,7 @@ RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
                                                   fisheye.final_estimate, summary.ate));
   write_loops(out / "loops.csv", result.loops);
   write_json(out / "timing.json", to_json(result.times));
-  write_json(out / "summary.json", summary_json(line, sequence, result, summary));
+  write_json(out / "summary.json", summary_json(line, sequence, upsampling, result, summary));
   if (!line.localize) {
     write_map(line, *result.map);  // the largest: where the disk gets full, the others are there
   }

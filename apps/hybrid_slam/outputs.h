@@ -4,6 +4,7 @@
 #include "apps/io/hybrid_error.h"
 #include "apps/io/trajectory.h"
 #include "apps/pipeline/slam_run.h"
+#include "apps/pipeline/upsampling.h"
 
 namespace hybrid_slam {
 
@@ -19,7 +20,8 @@ void write_map(const CommandLine& line, const MapSnapshot& map);
 
 // Writes every file of the run into line.out. Throws OutputError.
 RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
-                         const RunResult& result, double seconds);
+                         const UpsamplingEvidence& upsampling, const RunResult& result,
+                         double seconds);
 
 // A few lines for people.
 void print_summary(const CommandLine& line, const RunResult& result, const RunSummary& summary);

@@ -16,6 +16,13 @@
 
 namespace hybrid_slam {
 
+// Whether SIFT starts with an octave at twice the resolution.
+enum class Upsampling {
+  kAuto,  // the first pairs decide, see choose_upsampling(); on where nobody asks them
+  kOn,
+  kOff,
+};
+
 // What concerns the fisheye alone.
 struct FisheyeOptions {
   bool upsample = true;  // as of SIFT; the rest of its options holds for all cameras
@@ -34,6 +41,7 @@ struct SlamOptions {
   int features = 2000;  // N: per image; also the measure of the tracker's shares
   std::uint64_t seed = 0;
   SiftOptions sift;
+  Upsampling upsampling = Upsampling::kAuto;  // of the stereo pair; sift.upsample follows it
   StereoMatcherOptions stereo;
   StereoTrackerOptions tracking;
   FisheyeOptions fisheye;
@@ -43,7 +51,7 @@ struct SlamOptions {
   LoopOptions loops;
   BackendOptions backend;
 
-  // Hands `features` and `seed` down to the parts that use them.
+  // Hands `features`, `seed` and `upsampling` down to the parts that use them.
   void distribute();
 
   // Empty if the values can be used, else what is wrong.

@@ -58,7 +58,7 @@ TEST_CASE("written options are read again exactly, every key of them") {
   options.seed = ~std::uint64_t{0};
   options.stereo.ratio = 1.0 / 3;
   options.fisheye.view.mask = "a: mask #1.png";
-  options.sift.upsample = false;
+  options.upsampling = Upsampling::kOff;
   options.tracking.refinement.sigma = 0.1;
   options.backend.local_method = LocalMethod::kBundle;
   const std::string text = write_slam_options(options);

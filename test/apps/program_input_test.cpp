@@ -157,7 +157,7 @@ TEST_CASE("a configuration that cannot be used is refused with file, line and ke
   }
   SECTION("a value of the wrong type") {
     write_text(config, "sift:\n  upsample: perhaps\n");
-    reason = "options.yaml:2: sift.upsample: must be true or false";
+    reason = "options.yaml:2: sift.upsample: is none of auto, true, false";
   }
   SECTION("a word that is not among those to choose from") {
     write_text(config, "backend:\n  method: magic\n");
