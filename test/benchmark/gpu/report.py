@@ -131,7 +131,7 @@ def markdown(document, references):
     if clocks:
         about.append(f"SM clock {clocks['sm_mhz_median']} MHz (median during the bench)")
     lines = [f"Run of {document['date']}, pack of commit {pack['commit']} made {pack['date']}, "
-             f"{document.get('seconds', 0)} s. {'; '.join(about)}.", ""]
+             f"{document.get('seconds', 0)} s of steps. {'; '.join(about)}.", ""]
     lines += table(["step", "state", "s", "limit", ""],
                    [(name, record["state"], record["seconds"], record.get("limit_s", ""),
                      record.get("reason", (record.get("results") or {}).get("last_line", "")))
@@ -139,7 +139,8 @@ def markdown(document, references):
     lines += bench_table(records)
     runs = list(run_rows(records, references))
     if runs:
-        lines += ["", "Mean milliseconds per frame; the packed CPU's results are of another machine:", "",
+        lines += ["", "Mean milliseconds per frame. The packed CPU's results are for their errors: they are of "
+                  "another machine, which may have been busy:", "",
                   *table(RUN_TITLES, runs)]
     found = document.get("verdicts", [])
     if found:

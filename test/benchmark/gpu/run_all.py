@@ -144,8 +144,9 @@ def run_all(options, context, document):
             record = run_step(step, context, round(min(step.limit * slower, left), 1))
         else:
             record = {"state": "left", "reason": "no time left of the budget", "seconds": 0}
-        document["steps"][step.name] = record
-        document["seconds"] = round(time.monotonic() - start, 1)
+        records = {**document["steps"], step.name: record}
+        document["steps"] = {s.name: records[s.name] for s in STEPS if s.name in records}
+        document["seconds"] = round(sum(r["seconds"] for r in records.values()), 1)
         document["verdicts"] = report.verdicts(document["steps"], references)
         write_whole(options.out / "gpu.json", json.dumps(document, indent=1) + "\n")
         write_whole(options.out / "gpu.md", report.markdown(document, references))
@@ -179,7 +180,7 @@ def main():
         names = [name for name, record in document["steps"].items() if record["state"] == state]
         if names:
             print(f"{state}: {' '.join(names)}")
-    print(f"{document.get('seconds', 0)} s; {options.out}/gpu.json, gpu.md, gpu.log")
+    print(f"steps: {document.get('seconds', 0)} s; {options.out}/gpu.json, gpu.md, gpu.log")
     return 1 if "failed" in states or "left" in states else 0
 
 

@@ -155,7 +155,7 @@ class RunAll(unittest.TestCase):
         self.calls.unlink()
         self.run_all("--resume", "--only", "stereo_2k", "--only", "hybrid_6k", "--only", "bench", DEVICE="1")
         self.assertEqual(self.document()["steps"]["stereo_2k"], kept)
-        self.assertEqual(self.names("done"), ["stereo_2k", "bench", "hybrid_6k"])
+        self.assertEqual(self.names("done"), ["bench", "stereo_2k", "hybrid_6k"])
         self.assertEqual(len(self.programs_run("--features 2000")), 0)
         self.assertEqual(len(self.programs_run("--features 6000")), 1)
         other = self.folder / "elsewhere.json"

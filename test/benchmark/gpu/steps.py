@@ -20,7 +20,9 @@ AGREEMENT_FEATURES = 4000
 
 
 class Failed(Exception):
-    pass
+    def __init__(self, reason, output=""):
+        super().__init__(reason)
+        self.output = output
 
 
 class Skipped(Exception):
@@ -61,7 +63,7 @@ class Context:
         self.log.write(output)
         if process.returncode not in codes:
             lines = output.strip().splitlines() or [""]
-            raise Failed(f"exit code {process.returncode}: {lines[-1][:200]}")
+            raise Failed(f"exit code {process.returncode}: {lines[-1][:200]}", output)
         return output
 
     def folder(self, name):
@@ -161,9 +163,8 @@ def sanitizer(tool):
         try:
             output = context.call([program, "--tool", tool, "--error-exitcode", "1",
                                    context.program("sift_cuda_test"), "--quick"])
-        except Failed:
-            context.log.flush()
-            if "Device not supported" in pathlib.Path(context.log.name).read_text(errors="replace"):
+        except Failed as failure:
+            if "Device not supported" in failure.output:
                 raise Skipped("compute-sanitizer does not support this machine's device")
             raise
         return {"last_line": output.strip().splitlines()[-1]}
