@@ -69,13 +69,12 @@ class Methods {
 
   FeatureImage extract(std::size_t worker, ExtractionResult& result) {
     FeatureImage found;
-    const ImageSize size = read_image_size(result.image);
-    found.image = read_gray_image(result.image, size);
+    found.image = read_gray_image(result.image);
     for (int i = 0; i < line_.repeat; ++i) {
       found.features = methods_[worker]->extract(found.image, result.times);
     }
-    result.width = size.width;
-    result.height = size.height;
+    result.width = found.image.width;
+    result.height = found.image.height;
     result.keypoints = found.features.size();
     return found;
   }
@@ -132,7 +131,7 @@ void match_all(const CommandLine& line, Methods& methods, Evaluation& evaluation
 Evaluation evaluate(const CommandLine& line) {
   Evaluation evaluation;
   for (const std::string& image : line.images) {
-    read_image_size(image);  // throws
+    read_image_size(image);  // throws if it cannot be read
     evaluation.images.emplace_back().image = image;
   }
   make_folder(line.out);

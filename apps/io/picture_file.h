@@ -6,7 +6,7 @@
 
 namespace hybrid_slam {
 
-// Writes a PNG, whole or not at all. Throws OutputError.
+// Writes a picture of CV_8UC3 as PNG, whole or not at all. Throws OutputError.
 void write_picture(const std::filesystem::path& path, const cv::Mat& picture);
 
 }  // namespace hybrid_slam

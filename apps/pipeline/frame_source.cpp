@@ -1,7 +1,12 @@
 #include "apps/pipeline/frame_source.h"
 
+#include <array>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
+
+#include "apps/pipeline/sift_pool.h"
 
 namespace hybrid_slam {
 namespace {
@@ -27,35 +32,52 @@ std::vector<GrayImage> example_images(const ImageSequence& sequence) {
   return images;
 }
 
+// By an extractor of the pool. Adds what took time on a device, if there is one, under names that
+// begin with `stage`: how long all extractors were in use by other threads, then the device's own
+// time for each image.
+std::vector<FeatureSet> extract(SiftPool& pool, std::span<const GrayImage* const> images,
+                                const GrayImage* mask, const std::string& stage,
+                                StageTimes& times) {
+  StageClock waiting(times);
+  const SiftPool::Lease sift = pool.take();
+  if (pool.bounded()) waiting.lap(stage + "_wait");
+  std::vector<FeatureSet> features = sift->extract(images, mask);
+  for (const auto& [name, milliseconds] : sift->device_times()) {
+    times.add(stage + "_device_" + name, milliseconds);
+  }
+  return features;
+}
+
 class ImageFrameLoader final : public FrameLoader {
  public:
-  ImageFrameLoader(const ImageSequence& sequence, const SlamOptions& options, SiftDevice device,
-                   const GrayImage& fisheye_mask)
+  // `fisheye_sift`: null without a fisheye.
+  ImageFrameLoader(const ImageSequence& sequence, const SlamOptions& options, SiftPool& sift,
+                   SiftPool* fisheye_sift, const GrayImage& fisheye_mask)
       : sequence_(sequence),
         options_(options),
-        fisheye_mask_(fisheye_mask),
-        sift_(make_sift_on(device, options.sift)) {
-    if (sequence.info().fisheye) fisheye_sift_ = make_sift_on(device, fisheye_sift(options));
-  }
+        sift_(sift),
+        fisheye_sift_(fisheye_sift),
+        fisheye_mask_(fisheye_mask) {}
 
   FrameSet load(std::size_t index, StageTimes& times) override {
     StageClock clock(times);
     FrameImages images = sequence_.read(index);
     clock.lap("read");
-    FrameSet frames{load_stereo(images, clock), std::nullopt, std::move(images.fisheye_error)};
-    if (!images.fisheye.empty()) frames.fisheye = load_fisheye(images, clock);
+    FrameSet frames{load_stereo(images, clock, times), std::nullopt,
+                    std::move(images.fisheye_error)};
+    if (!images.fisheye.empty()) frames.fisheye = load_fisheye(images, clock, times);
     return frames;
   }
 
  private:
-  Frame load_stereo(const FrameImages& images, StageClock& clock) {
-    FeatureSet left = sift_->extract(images.left, nullptr);
-    FeatureSet right = sift_->extract(images.right, nullptr);
+  Frame load_stereo(const FrameImages& images, StageClock& clock, StageTimes& times) {
+    const std::array pair{&images.left, &images.right};
+    std::vector<FeatureSet> found = extract(sift_, pair, nullptr, "sift", times);
     clock.lap("sift");
     auto left_pyramid = std::make_shared<const ImagePyramid>(images.left);
     const ImagePyramid right_pyramid(images.right);
     StereoFeatures features =
-        match_stereo(std::move(left), std::move(right), left_pyramid.get(), &right_pyramid,
+        match_stereo(std::move(found[0]), std::move(found[1]), left_pyramid.get(), &right_pyramid,
                      sequence_.info().stereo, options_.stereo);
     clock.lap("stereo_match");
     Frame frame = make_frame(images.frame_index, images.time, std::move(features),
@@ -64,11 +86,13 @@ class ImageFrameLoader final : public FrameLoader {
     return frame;
   }
 
-  Frame load_fisheye(FrameImages& images, StageClock& clock) {
+  Frame load_fisheye(FrameImages& images, StageClock& clock, StageTimes& times) {
     GrayImage& image = images.fisheye;
     if (options_.fisheye.view.clahe > 0) enhance_contrast(image, options_.fisheye.view.clahe);
-    FeatureSet features = fisheye_sift_->extract(image, &fisheye_mask_);
-    Frame frame = make_mono_frame(images.frame_index, images.time, std::move(features), image.width,
+    const std::array<const GrayImage*, 1> single{&image};
+    std::vector<FeatureSet> found =
+        extract(*fisheye_sift_, single, &fisheye_mask_, "fisheye_sift", times);
+    Frame frame = make_mono_frame(images.frame_index, images.time, std::move(found[0]), image.width,
                                   image.height);
     frame.image = std::make_shared<const ImagePyramid>(image);
     clock.lap("fisheye_sift");
@@ -77,24 +101,30 @@ class ImageFrameLoader final : public FrameLoader {
 
   const ImageSequence& sequence_;
   SlamOptions options_;
+  SiftPool& sift_;
+  SiftPool* fisheye_sift_;
   const GrayImage& fisheye_mask_;
-  std::unique_ptr<SiftExtractor> sift_;
-  std::unique_ptr<SiftExtractor> fisheye_sift_;  // null without a fisheye
 };
 
 }  // namespace
 
 ImageFrameSource::ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options,
                                    SiftDevice device)
-    : sequence_(sequence), options_(options), device_(device) {
+    : sequence_(sequence),
+      options_(options),
+      sift_(std::make_unique<SiftPool>(device, options.sift, 2)) {
   if (sequence.info().fisheye) {
+    fisheye_sift_ = std::make_unique<SiftPool>(device, fisheye_sift(options), 1);
     fisheye_mask_ =
         make_fisheye_mask(*sequence.info().fisheye, example_images(sequence), options.fisheye.view);
   }
 }
 
+ImageFrameSource::~ImageFrameSource() = default;
+
 std::unique_ptr<FrameLoader> ImageFrameSource::make_loader() const {
-  return std::make_unique<ImageFrameLoader>(sequence_, options_, device_, fisheye_mask_);
+  return std::make_unique<ImageFrameLoader>(sequence_, options_, *sift_, fisheye_sift_.get(),
+                                            fisheye_mask_);
 }
 
 }  // namespace hybrid_slam

@@ -20,6 +20,8 @@ struct FrameSet {
   std::string fisheye_error;     // why it cannot
 };
 
+class SiftPool;
+
 // Turns one index into frames ready to be tracked. Used by one thread at a time.
 class FrameLoader {
  public:
@@ -47,6 +49,7 @@ class ImageFrameSource final : public FrameSource {
   // Throws InputError as make_fisheye_mask() does.
   ImageFrameSource(const ImageSequence& sequence, const SlamOptions& options,
                    SiftDevice device = SiftDevice::kCpu);
+  ~ImageFrameSource() override;
 
   std::size_t size() const override { return sequence_.size(); }
   const Calibrated<RectifiedStereo>& camera() const override { return sequence_.info().stereo; }
@@ -59,8 +62,9 @@ class ImageFrameSource final : public FrameSource {
  private:
   const ImageSequence& sequence_;
   SlamOptions options_;
-  SiftDevice device_;
-  GrayImage fisheye_mask_;  // empty without a fisheye
+  std::unique_ptr<SiftPool> sift_;          // of all loaders
+  std::unique_ptr<SiftPool> fisheye_sift_;  // null without a fisheye
+  GrayImage fisheye_mask_;                  // empty without a fisheye
 };
 
 }  // namespace hybrid_slam

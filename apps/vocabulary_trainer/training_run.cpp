@@ -38,7 +38,7 @@ class Extraction {
       std::vector<FeatureSet> features(std::min(at_once_, images.size() - begin));
       parallel_for(features.size(), options_.threads, [&](std::size_t i, std::size_t worker) {
         const fs::path& path = images[begin + i];
-        const GrayImage image = read_gray_image(path, read_image_size(path));
+        const GrayImage image = read_gray_image(path);
         features[i] = extractors_[worker]->extract(image, nullptr);
       });
       for (const FeatureSet& image : features) {

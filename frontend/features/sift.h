@@ -41,10 +41,26 @@ class SiftExtractor {
   // `mask`: null, or an image of the same size whose zero pixels must hold no keypoint.
   virtual FeatureSet extract(const GrayImage& image, const GrayImage* mask) = 0;
 
+  // extract() in two steps, so that an engine with a device of its own works there while the caller
+  // starts others; an engine without one does all in finish(). The image and the mask must live
+  // and stay as they are until finish(), which is called once after each start().
+  virtual void start(const GrayImage& image, const GrayImage* mask) {
+    started_image_ = &image;
+    started_mask_ = mask;
+  }
+  virtual FeatureSet finish() { return extract(*started_image_, started_mask_); }
+
   // Stages of the image last extracted, in their order, and their milliseconds. Where measuring
   // makes the whole slower, there are none unless time_stages() asked for them before.
   virtual std::vector<std::pair<std::string, double>> stage_times() const { return {}; }
   virtual void time_stages(bool /*timed*/) {}
+  // The same with what a device other than the CPU does as a whole (upload, kernels, download) for
+  // stages, by the device's clock: at next to no cost. Without such a device it does nothing.
+  virtual void time_device(bool /*timed*/) {}
+
+ private:
+  const GrayImage* started_image_ = nullptr;
+  const GrayImage* started_mask_ = nullptr;
 };
 
 // The engine for CPUs. Throws std::invalid_argument if the options are not valid.

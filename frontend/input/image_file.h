@@ -13,16 +13,16 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
 };
 
-// Size of a PNG or JPEG file from its header; nothing is decoded. Throws InputError if the file is
-// missing, is neither, or ends before its end marker.
-ImageSize read_image_size(const std::filesystem::path& path);
+// Decodes a PNG or JPEG file, told by its content. Colour becomes grey, 16 bits per sample become
+// 8, an EXIF orientation is ignored (the calibration belongs to the stored pixels). Throws
+// InputError naming the file if it is missing, truncated, damaged or neither. What goes unnoticed
+// is a JPEG whose compressed data are altered to other valid ones: the format has no checksum.
+GrayImage read_gray_image(const std::filesystem::path& path);
 
-// Decodes a PNG or JPEG file, told by its content. Colour becomes grey, 16 bits per sample are
-// scaled to 8, an EXIF orientation is ignored (the calibration belongs to the stored pixels).
-// Throws InputError naming the file if it is missing, truncated, damaged or not of the `expected`
-// size. Decoders return what they have of a truncated file; so its structure is walked first, up to
-// the end marker (PNG IEND, with the checksums on the way; JPEG EOI). What goes unnoticed is a JPEG
-// whose compressed data are altered in the middle: the format has no checksum.
+// The same for an image of which the size is known: another one is refused.
 GrayImage read_gray_image(const std::filesystem::path& path, ImageSize expected);
+
+// Size of an image that can be read: it is decoded, and a damaged one refused as above.
+ImageSize read_image_size(const std::filesystem::path& path);
 
 }  // namespace hybrid_slam

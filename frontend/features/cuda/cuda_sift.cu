@@ -31,6 +31,8 @@ void CudaSift::start(const GrayImage& image, const GrayImage* mask) {
 
 FeatureSet CudaSift::finish() { return engine_->sift.finish(); }
 
+std::size_t CudaSift::device_bytes() const { return engine_->sift.backend().device_bytes(); }
+
 void CudaSift::time(CudaTiming timing) { engine_->sift.backend().time(timing); }
 
 CudaStageTimes CudaSift::stage_times() const { return engine_->sift.backend().stage_times(); }

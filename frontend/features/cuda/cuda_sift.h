@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 
@@ -25,14 +26,18 @@ class CudaSift final : public SiftExtractor {
   FeatureSet extract(const GrayImage& image, const GrayImage* mask) override;
 
   // Enqueues all work for an image, which may change as soon as this returns.
-  void start(const GrayImage& image, const GrayImage* mask);
+  void start(const GrayImage& image, const GrayImage* mask) override;
   // Waits for what was started last and returns its features.
-  FeatureSet finish();
+  FeatureSet finish() override;
 
   // Times of the image last finished are there if timing was on when it was started.
   void time(CudaTiming timing);
   void time_stages(bool timed) override { time(timed ? CudaTiming::kStages : CudaTiming::kOff); }
+  void time_device(bool timed) override { time(timed ? CudaTiming::kWhole : CudaTiming::kOff); }
   CudaStageTimes stage_times() const override;
+
+  // Memory of the device that this instance holds, by the last image's size.
+  std::size_t device_bytes() const;
 
  private:
   friend class CudaFeatures;

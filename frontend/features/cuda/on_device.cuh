@@ -47,6 +47,7 @@ class OnDevice {
     void* memory = nullptr;
     check(cudaMalloc(&memory, bytes > 0 ? bytes : 1), "memory of the device");
     device_memory_.push_back(memory);
+    device_bytes_ += bytes;
     return memory;
   }
   void* allocate_for_host(std::size_t bytes) {
@@ -58,6 +59,7 @@ class OnDevice {
   void release() {
     wait();
     drop_record();
+    device_bytes_ = 0;
     for (void* memory : std::exchange(device_memory_, {})) check(cudaFree(memory), "release");
     for (void* memory : std::exchange(host_memory_, {})) check(cudaFreeHost(memory), "release");
   }
@@ -129,6 +131,7 @@ class OnDevice {
   }
 
   cudaStream_t stream() const { return stream_; }
+  std::size_t device_bytes() const { return device_bytes_; }  // allocated
 
  private:
   template <typename Launches>
@@ -158,6 +161,7 @@ class OnDevice {
   cudaStream_t stream_ = nullptr;
   cudaGraphExec_t record_ = nullptr;
   std::vector<void*> device_memory_;
+  std::size_t device_bytes_ = 0;
   std::vector<void*> host_memory_;
   bool recording_ = false;
   CudaTiming timing_ = CudaTiming::kOff;

@@ -23,12 +23,17 @@ class OnHost {
 
   // Memory of this backend, and memory of the host that it copies from and to. Valid until
   // release().
-  void* allocate(std::size_t bytes) { return memory(bytes); }
+  void* allocate(std::size_t bytes) {
+    device_bytes_ += bytes;
+    return memory(bytes);
+  }
   void* allocate_for_host(std::size_t bytes) { return memory(bytes); }
   void release() {
     for (void* block : blocks_) std::free(block);
     blocks_.clear();
+    device_bytes_ = 0;
   }
+  std::size_t device_bytes() const { return device_bytes_; }  // by allocate()
 
   void clear(void* to, std::size_t bytes) { std::memset(to, 0, bytes); }
   void upload(void* to, const void* from, std::size_t bytes) { std::memcpy(to, from, bytes); }
@@ -67,6 +72,7 @@ class OnHost {
 
   bool backward_;
   std::vector<void*> blocks_;
+  std::size_t device_bytes_ = 0;
 };
 
 }  // namespace hybrid_slam::cuda

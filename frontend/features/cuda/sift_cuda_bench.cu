@@ -47,6 +47,7 @@ struct Row {
   std::size_t found = 0;  // features or matches
   double device = 0;      // kernels alone [ms]; 0: not measured
   double total = 0;       // [ms]
+  std::size_t bytes = 0;  // of the device's memory that an extractor holds
   CudaStageTimes stages;
 };
 
@@ -92,6 +93,7 @@ Row bench_extraction(const std::string& name, const GrayImage& image, int featur
   row.name = name + " " + std::to_string(image.width) + "x" + std::to_string(image.height) +
              (upsample ? " upsampled" : "") + " N=" + std::to_string(features);
   row.found = run();
+  row.bytes = sift.device_bytes();
   row.total = median_of_clock(run);
   row.device = time_of(median_of_stages(sift, CudaTiming::kWhole, run), "kernels");
   row.stages = median_of_stages(sift, CudaTiming::kStages, run);
@@ -147,8 +149,8 @@ Row bench_stereo_step(const GrayImage& left, const GrayImage& right) {
 }
 
 void print(const Row& row) {
-  std::printf("%s: %zu found, device %.4f ms, total %.4f ms\n", row.name.c_str(), row.found,
-              row.device, row.total);
+  std::printf("%s: %zu found, device %.4f ms, total %.4f ms, memory %.1f MB\n", row.name.c_str(),
+              row.found, row.device, row.total, static_cast<double>(row.bytes) / 1e6);
   for (const auto& [stage, time] : row.stages) std::printf("  %-12s %.4f\n", stage.c_str(), time);
 }
 
@@ -167,7 +169,8 @@ void write_json(const std::string& name, const std::vector<Row>& rows) {
   for (const Row& row : rows) {
     json << (&row == rows.data() ? "\n" : ",\n") << "{\"name\": " << quoted(row.name)
          << ", \"found\": " << row.found << ", \"device_ms\": " << row.device
-         << ", \"total_ms\": " << row.total << ", \"stages\": {";
+         << ", \"total_ms\": " << row.total << ", \"device_bytes\": " << row.bytes
+         << ", \"stages\": {";
     for (const auto& stage : row.stages) {
       json << (&stage == row.stages.data() ? "" : ", ") << quoted(stage.first) << ": "
            << stage.second;

@@ -131,6 +131,22 @@ TEST_CASE("CUDA's SIFT makes room where an image has very many extrema") {
   CHECK(std::abs(std::ssize(all.keypoints) - std::ssize(cpu.keypoints)) < 40);
 }
 
+TEST_CASE("CUDA's SIFT takes as much memory as docs/sift.md says") {
+  for (const bool upsample : {false, true}) {
+    SiftOptions options;
+    options.upsample = upsample;
+    options.max_features = 1000;
+    HostCudaSift sift(options);
+    const auto bytes = [&] { return static_cast<double>(sift.engine().backend().device_bytes()); };
+    sift.extract(texture(320, 240, 9), nullptr);
+    const double samples = 320 * 240 * (upsample ? 4 : 1);
+    CHECK(bytes() == Approx(57 * samples + 300 * options.max_features + 2e5).epsilon(0.03));
+    const double before = bytes();
+    sift.extract(texture(160, 120, 9), nullptr);
+    CHECK(bytes() < before / 2);  // what the larger image needed is given back
+  }
+}
+
 // Sorts and selects extrema as the engine does, in both orders; returns indices.
 std::vector<int> select(const std::vector<Keypoint>& keypoints, int width, int height,
                         int max_count, bool backward) {

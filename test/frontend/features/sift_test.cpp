@@ -12,6 +12,7 @@
 
 #include <catch2/catch.hpp>
 #include "apps/feature_eval/opencv_sift.h"
+#include "frontend/features/sift_batch.h"
 #include "frontend/features/sift_device.h"
 #include "test/frontend/features/feature_agreement.h"
 #include "test/frontend/features/host_cuda_sift.h"
@@ -219,6 +220,30 @@ TEST_CASE("SIFT on a device that cannot be used is refused, on the CPU it is the
   SiftOptions blurred;
   blurred.initial_sigma = 10;
   CHECK_FALSE(why_no_cuda_sift(blurred).empty());
+}
+
+TEST_CASE("SIFT in two steps, and of several images at a time, is that of each image") {
+  const GrayImage images[] = {texture(120, 90, 1), texture(120, 90, 2), texture(120, 90, 3)};
+  GrayImage mask{120, 90, std::vector<std::uint8_t>(120 * 90, 1)};
+  std::fill_n(mask.pixels.begin(), 120 * 45, std::uint8_t{0});
+  const Engine engine = GENERATE(from_range(engines()));
+  INFO(engine.name);
+  const auto one = engine.make({}), other = engine.make({});
+  one->start(images[0], &mask);
+  other->start(images[1], nullptr);
+  const FeatureSet first = one->finish();
+  CHECK(first.size() > 20);
+  CHECK(same_bytes(first, engine.make({})->extract(images[0], &mask)));
+  CHECK(same_bytes(other->finish(), engine.make({})->extract(images[1], nullptr)));
+
+  const std::vector<const GrayImage*> all{&images[2], &images[0], &images[1]};
+  SiftBatch batch(SiftDevice::kCpu, {}, 2);
+  const std::vector<FeatureSet> found = batch.extract(all, &mask);
+  REQUIRE(found.size() == 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(same_bytes(found[i], make_sift({})->extract(*all[i], &mask)));
+  }
+  CHECK(batch.device_times().empty());
 }
 
 TEST_CASE("SIFT refuses options and images that cannot be") {

@@ -1,6 +1,10 @@
 #include "frontend/input/image_file.h"
 
+#include <png.h>
+
 #include <catch2/catch.hpp>
+#include <cstdio>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 
 #include "test/frontend/input/dataset_writer.h"
@@ -18,6 +22,87 @@ cv::Mat smooth_picture() {
     }
   }
   return picture;
+}
+
+// Any kind of PNG, with random samples. Palettes have 2^bits random entries, the first half of them
+// transparent.
+void write_png(const std::filesystem::path& path, int color_type, int bits, bool interlaced) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"),
+                                                             std::fclose);
+  REQUIRE(file);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_init_io(png, file.get());
+  png_set_IHDR(png, info, kSize.width, kSize.height, bits, color_type,
+               interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
+  cv::RNG rng(static_cast<std::uint64_t>(color_type * 100 + bits));
+  const auto byte = [&] { return static_cast<png_byte>(rng.uniform(0, 256)); };
+  if (color_type == PNG_COLOR_TYPE_PALETTE) {
+    std::vector<png_color> palette(std::size_t{1} << bits);
+    for (png_color& entry : palette) entry = {byte(), byte(), byte()};
+    png_set_PLTE(png, info, palette.data(), static_cast<int>(palette.size()));
+    const std::vector<png_byte> alpha(palette.size() / 2, 0);
+    png_set_tRNS(png, info, alpha.data(), static_cast<int>(alpha.size()), nullptr);
+  }
+  png_write_info(png, info);
+  const std::size_t bytes = png_get_rowbytes(png, info);
+  std::vector<std::vector<png_byte>> rows(kSize.height, std::vector<png_byte>(bytes));
+  std::vector<png_bytep> pointers;
+  for (auto& row : rows) {
+    for (png_byte& value : row) value = byte();
+    pointers.push_back(row.data());
+  }
+  png_write_image(png, pointers.data());
+  png_write_end(png, info);
+  png_destroy_write_struct(&png, &info);
+}
+
+void check_same_as_opencv(const std::filesystem::path& path) {
+  const cv::Mat expected =
+      cv::imread(path.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+  REQUIRE(expected.cols == kSize.width);
+  CHECK(holds(read_gray_image(path, kSize), expected));
+  CHECK(holds(read_gray_image(path), expected));
+}
+
+TEST_CASE("every kind of PNG gives the pixels that OpenCV makes of it") {
+  const TempFolder folder;
+  const std::vector<std::pair<int, std::vector<int>>> kinds{{PNG_COLOR_TYPE_GRAY, {1, 2, 4, 8, 16}},
+                                                            {PNG_COLOR_TYPE_PALETTE, {1, 2, 4, 8}},
+                                                            {PNG_COLOR_TYPE_RGB, {8, 16}},
+                                                            {PNG_COLOR_TYPE_RGB_ALPHA, {8, 16}},
+                                                            {PNG_COLOR_TYPE_GRAY_ALPHA, {8, 16}}};
+  for (const auto& [color_type, depths] : kinds) {
+    for (const int bits : depths) {
+      for (const bool interlaced : {false, true}) {
+        INFO("colour type " << color_type << ", " << bits << " bits, interlaced " << interlaced);
+        write_png(folder.path() / "a.png", color_type, bits, interlaced);
+        check_same_as_opencv(folder.path() / "a.png");
+      }
+    }
+  }
+}
+
+TEST_CASE("every kind of JPEG gives the pixels that OpenCV makes of it") {
+  const TempFolder folder;
+  const auto path = folder.path() / "a.jpg";
+  cv::Mat noise(kSize.height, kSize.width, CV_8UC3);
+  cv::RNG(7).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  for (const int progressive : {0, 1}) {
+    for (const int restart : {0, 2}) {
+      for (const int quality : {30, 95}) {
+        const std::vector<int> options{cv::IMWRITE_JPEG_PROGRESSIVE,  progressive,
+                                       cv::IMWRITE_JPEG_RST_INTERVAL, restart,
+                                       cv::IMWRITE_JPEG_QUALITY,      quality};
+        INFO("progressive " << progressive << ", restarts " << restart << ", quality " << quality);
+        REQUIRE(cv::imwrite(path.string(), noise, options));
+        check_same_as_opencv(path);
+        REQUIRE(cv::imwrite(path.string(), smooth_picture(), options));
+        check_same_as_opencv(path);
+      }
+    }
+  }
 }
 
 TEST_CASE("a grey PNG is read pixel by pixel") {
@@ -91,6 +176,31 @@ TEST_CASE("a PNG altered anywhere before its end is refused or gives the same pi
         complaint([&] { image = read_gray_image(folder.path() / "b.png", kSize); });
     CHECK((!line.empty() || holds(image, picture)));
   }
+}
+
+TEST_CASE("a PNG is refused for damage beside its pixels, too") {
+  const TempFolder folder;
+  const std::filesystem::path path = folder.path() / "a.png";
+  write_png(path, PNG_COLOR_TYPE_PALETTE, 8, false);
+  std::string bytes = read_text(path);
+  const std::size_t transparency = bytes.find("tRNS");
+  REQUIRE(transparency != std::string::npos);
+  bytes[transparency + 4] = 'x';
+  write_text(path, bytes);
+  CHECK(complaint([&] { read_gray_image(path); }) ==
+        path.string() + ": damaged PNG (tRNS: CRC error)");
+}
+
+TEST_CASE("a JPEG that lacks some of its compressed data is refused") {
+  const TempFolder folder;
+  cv::Mat noise(kSize.height, kSize.width, CV_8UC1);
+  cv::RNG(7).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  write_picture(folder.path() / "a.jpg", noise);
+  std::string bytes = read_text(folder.path() / "a.jpg");
+  bytes.erase(bytes.size() / 2, bytes.size() / 4);  // its end marker stays
+  write_text(folder.path() / "a.jpg", bytes);
+  const std::string line = complaint([&] { read_gray_image(folder.path() / "a.jpg", kSize); });
+  CHECK(line.find("a.jpg: damaged JPEG (") != std::string::npos);
 }
 
 TEST_CASE("what is no image, missing or of another size is refused") {
