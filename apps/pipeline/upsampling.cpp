@@ -12,7 +12,7 @@ namespace hybrid_slam {
 namespace {
 
 constexpr std::size_t kPairs = 3;     // that are looked at
-constexpr double kMaxSize = 3.3e-3;   // [rad]: between 2.9 and 3.9, see the header
+constexpr double kMaxSize = 2e-3;     // [rad], see the header
 constexpr double kFullBudget = 0.95;  // of the features asked for: such an image has enough
 
 // Scales over the focal length of the left features with a right match [rad].
@@ -52,7 +52,8 @@ UpsamplingEvidence look_at_first_pairs(const ImageSequence& sequence, const Slam
       if (i > kPairs * kPairs) break;  // whoever reads the whole sequence will hear of it
     }
   }
-  if (sizes.empty()) return {"unreadable pairs", 0, 0};
+  if (pairs == 0) return {"unreadable pairs", 0, 0};
+  if (sizes.empty()) return {"no matches", evidence.features, 0};
   evidence.feature_size = median(sizes);
   return evidence;
 }
