@@ -2,9 +2,20 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
+#include "backend/problem/odometry_constraints.h"
+
 namespace hybrid_slam {
+
+namespace {
+
+// What the share of odometry that counts may be off by before its edge is made anew. The odometer
+// knows its own noise no better, from some tens of matches.
+constexpr double kShareTolerance = 0.1;
+
+}  // namespace
 
 std::string MapSmootherOptions::validate() const {
   if (!(min_motion >= 0)) return "min_motion must not be negative";
@@ -21,6 +32,7 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
   const std::vector<LandmarkId> changed =
       known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
   for (const LandmarkId id : changed) take_in_landmark(*map, id);
+  take_in_odometry(*map);
   const UpdateSummary updated = solver_.update();
 
   forget_marginalized(*map, updated.marginalized);
@@ -63,6 +75,34 @@ void MapSmoother::take_in_loops(const MapSnapshot& map) {
                       loop.information.topLeftCorner<6, 6>(), true});
   }
   new_loops_.clear();
+}
+
+// Of keyframes that changed: one that lost or gained landmarks did, too.
+void MapSmoother::take_in_odometry(const MapSnapshot& map) {
+  const std::vector<KeyframeId> changed =
+      known_map_ != nullptr ? map.changed_keyframes(*known_map_) : map.keyframe_ids();
+  for (const KeyframeId id : changed) take_in_odometry(map, id);
+}
+
+void MapSmoother::take_in_odometry(const MapSnapshot& map, KeyframeId id) {
+  const Keyframe* keyframe = map.find(id);
+  const auto odometry = keyframe != nullptr ? keyframe->odometry : nullptr;
+  const auto found = odometry_.find(id);
+  if (odometry == nullptr && found == odometry_.end()) return;
+  KnownOdometry& known = found != odometry_.end() ? found->second : odometry_[id];
+  const double share = odometry != nullptr ? unshared(map, *keyframe) : 0;
+  if (known.odometry == odometry && std::abs(share - known.share) <= kShareTolerance) return;
+  known.odometry = odometry;
+  known.share = share;
+  if (known.marginalized) return;  // it is in the prior, and must not count twice
+  if (known.edge != kNone) solver_.remove_edge(std::exchange(known.edge, kNone));
+  const auto constraint =
+      odometry != nullptr ? odometry_constraint(*keyframe, share) : std::nullopt;
+  if (!constraint) return;
+  take_in_keyframes(map, id);
+  known.edge = solver_.add_edge({pose_of_[id.value], pose_of_[odometry->previous.value],
+                                 without_scale(constraint->a_from_b),
+                                 constraint->information.topLeftCorner<6, 6>(), false});
 }
 
 // Brings what the solver has of a landmark in line with the map.
@@ -109,16 +149,16 @@ void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
   for (const LandmarkId id : map.at(newest).landmarks) {
     const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
     if (found == landmarks_.end()) continue;
-    for (View& view : found->second.views) {
-      if (view.in_solver == kNone) continue;
+    std::erase_if(found->second.views, [&](const View& view) {
+      if (view.in_solver == kNone) return false;
       const bool stereo = map.at(view.seen.keyframe).observations->has_right(view.seen.keypoint);
       if (solver_.chi2(view.in_solver) <= (stereo ? options.chi2_stereo : options.chi2_mono)) {
-        continue;
+        return false;
       }
       solver_.remove_observation(view.in_solver);
-      view.in_solver = kNone;
       result.outliers.push_back({id, view.seen});
-    }
+      return true;  // forgotten: where the map takes it in again, it is a new one
+    });
   }
 }
 
@@ -148,6 +188,16 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
 // The solver let go of these poses and of all observations of what they see.
 void MapSmoother::forget_marginalized(const MapSnapshot& map,
                                       const std::vector<std::uint32_t>& poses) {
+  const auto is_gone = [&](KeyframeId id) {
+    return std::binary_search(poses.begin(), poses.end(), pose_of_[id.value]);
+  };
+  for (auto& [id, known] : odometry_) {
+    if (poses.empty() || known.edge == kNone) continue;
+    if (is_gone(id) || is_gone(known.odometry->previous)) {
+      known.edge = kNone;
+      known.marginalized = true;
+    }
+  }
   for (const std::uint32_t pose : poses) {
     const Keyframe* keyframe = map.find(keyframe_of_[pose]);
     if (keyframe == nullptr) continue;

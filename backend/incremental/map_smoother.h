@@ -45,8 +45,7 @@ class MapSmoother {
  private:
   static constexpr std::uint32_t kNone = static_cast<std::uint32_t>(-1);
 
-  // An observation of the map and its index in the solver; kNone once it was marginalised or set
-  // aside.
+  // An observation of the map and its index in the solver; kNone once it was marginalised.
   struct View {
     Observation seen;
     std::uint32_t in_solver = kNone;
@@ -56,9 +55,20 @@ class MapSmoother {
     std::vector<View> views;
   };
 
+  // A keyframe's odometry as an edge of the solver; kNone where the map holds all of it already,
+  // and once it was marginalised.
+  struct KnownOdometry {
+    std::shared_ptr<const Odometry> odometry;
+    double share = 0;  // of its information that the edge has
+    std::uint32_t edge = kNone;
+    bool marginalized = false;
+  };
+
   void take_in_keyframes(const MapSnapshot& map, KeyframeId last);
   void take_in_loops(const MapSnapshot& map);
   void take_in_landmark(const MapSnapshot& map, LandmarkId id);
+  void take_in_odometry(const MapSnapshot& map);
+  void take_in_odometry(const MapSnapshot& map, KeyframeId id);
   std::uint32_t add_observation(const MapSnapshot& map, std::uint32_t point,
                                 const Observation& seen);
   void set_outliers_aside(const MapSnapshot& map, KeyframeId newest, BundleResult& result);
@@ -73,6 +83,7 @@ class MapSmoother {
   std::vector<std::uint32_t> pose_of_;   // by keyframe
   std::vector<KeyframeId> keyframe_of_;  // by pose
   std::unordered_map<LandmarkId, KnownLandmark> landmarks_;
+  std::unordered_map<KeyframeId, KnownOdometry> odometry_;
   std::vector<PoseConstraint> new_loops_;
 };
 

@@ -5,6 +5,7 @@
 
 #include "backend/map/frame_observations.h"
 #include "backend/map/ids.h"
+#include "backend/map/odometry.h"
 #include "cameras/geometry/rigid3d.h"
 
 namespace hybrid_slam {
@@ -22,11 +23,12 @@ struct Keyframe {
   KeyframeId id;
   std::shared_ptr<const FrameObservations> observations;
   Rigid3d cam_from_world;
-  std::vector<LandmarkId> landmarks;  // one per keypoint; invalid where there is none
-  std::vector<Covisible> covisible;   // every keyframe sharing a landmark, ascending by id
-  KeyframeId parent;                  // in the spanning tree; invalid for the origin
-  std::vector<KeyframeId> children;   // ascending
-  bool keep = false;                  // exempt from culling (origin, ends of loops)
+  std::vector<LandmarkId> landmarks;         // one per keypoint; invalid where there is none
+  std::vector<Covisible> covisible;          // every keyframe sharing a landmark, ascending by id
+  KeyframeId parent;                         // in the spanning tree; invalid for the origin
+  std::vector<KeyframeId> children;          // ascending
+  bool keep = false;                         // exempt from culling (origin, ends of loops)
+  std::shared_ptr<const Odometry> odometry;  // from the keyframe before; null where there is none
 };
 
 }  // namespace hybrid_slam

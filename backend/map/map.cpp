@@ -5,6 +5,7 @@
 
 #include "backend/map/landmark_attributes.h"
 #include "backend/map/map_transaction.h"
+#include "backend/map/odometry.h"
 #include "backend/map/spanning_tree.h"
 
 namespace hybrid_slam {
@@ -33,6 +34,8 @@ void validate(const MapTables& tables, const NewKeyframe& made) {
   for (const auto& [keypoint, point] : made.new_points) {
     require(keypoint < frame.size() && point.allFinite(), "Map::add_keyframe: bad new point");
   }
+  require(made.odometry == nullptr || is_valid(*made.odometry, frame.size()),
+          "Map::add_keyframe: odometry without a covariance, or by keypoints that are not there");
 }
 
 // Nothing that has gone is a fault; what can never have been right is.
@@ -93,6 +96,7 @@ KeyframeId Map::add_keyframe(const NewKeyframe& made) {
   }
   transaction.commit();
   if (id != tables.origin) attach_to_tree(tables, id, made.reference);
+  attach_odometry(tables, id, made.odometry);
   return id;
 }
 

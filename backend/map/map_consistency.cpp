@@ -5,6 +5,7 @@
 
 #include "backend/map/landmark_attributes.h"
 #include "backend/map/map.h"
+#include "backend/map/odometry.h"
 
 namespace hybrid_slam {
 
@@ -37,6 +38,7 @@ class ConsistencyCheck {
     check(keyframe.observations->camera.value < tables_.cameras.size(), "unknown camera");
     check(keyframe.cam_from_world.params.allFinite(), "pose is not finite");
     check(keyframe.landmarks.size() == keyframe.observations->size(), "wrong number of landmarks");
+    check_odometry(index, keyframe);
     for (std::uint32_t keypoint = 0; keypoint < keyframe.landmarks.size(); ++keypoint) {
       const LandmarkId id = keyframe.landmarks[keypoint];
       if (!id.valid()) continue;
@@ -48,6 +50,16 @@ class ConsistencyCheck {
                 1,
             "sees a landmark that does not know of it");
     }
+  }
+
+  void check_odometry(std::uint64_t index, const Keyframe& keyframe) {
+    if (keyframe.odometry == nullptr) return;
+    const Odometry& odometry = *keyframe.odometry;
+    const auto check = [&](bool ok, const char* fault) { expect(ok, "keyframe", index, fault); };
+    check(odometry.previous.valid() && odometry.previous == keyframe_before(tables_, keyframe.id),
+          "odometry that does not begin at the keyframe before");
+    check(is_valid(odometry, keyframe.observations->size()),
+          "odometry without a covariance, or by keypoints that are not there");
   }
 
   void check_landmark(std::uint64_t index, const Landmark& landmark) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -16,6 +17,7 @@ namespace hybrid_slam {
 namespace {
 
 constexpr std::size_t kSingleSections = 3;  // info, cameras, state
+constexpr std::uint32_t kOdometryVersion = 3;
 constexpr std::size_t kNumbersPerKeypoint = 6;
 constexpr std::uint32_t kMaxCount = 1'000'000'000;  // of frames: the sum of two is an int
 constexpr double kMaxNormError = 1e-6;              // of a quaternion
@@ -116,9 +118,22 @@ std::shared_ptr<const FrameObservations> read_frame(ByteReader& in) {
   return frame;
 }
 
+// In exact symmetry, as it was written.
+Matrix6d read_covariance(ByteReader& in) {
+  Matrix6d covariance;
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column <= row; ++column) {
+      covariance(row, column) = covariance(column, row) = read_finite(in, "covariance");
+    }
+  }
+  return covariance;
+}
+
 // Fills the tables section by section.
 class MapDecoder {
  public:
+  explicit MapDecoder(std::uint32_t version) : version_(version) {}
+
   void read(std::string_view section, ByteReader& in, MapFileInfo& info) {
     if (section == kInfoSection) {
       info.program = in.text();
@@ -129,6 +144,8 @@ class MapDecoder {
       read_state(in);
     } else if (section == kKeyframesSection) {
       while (!in.at_end()) read_keyframe(in);
+    } else if (section == kOdometrySection) {
+      while (!in.at_end()) read_odometry(in);
     } else if (section == kErasedSection) {
       while (!in.at_end()) read_erased(in);
     } else {
@@ -142,6 +159,7 @@ class MapDecoder {
         tables_.landmarks.size() != landmarks_) {
       end.fail("keyframes or landmarks are missing");
     }
+    if (odometry_ != 0) end.fail("odometry is missing, or too much of it");
     link_tree(end);
     covisibility_.write(tables_.keyframes);
     return std::move(tables_);
@@ -160,6 +178,7 @@ class MapDecoder {
     keyframes_ = in.number<std::uint32_t>();
     erased_ = in.number<std::uint32_t>();
     landmarks_ = in.number<std::uint32_t>();
+    if (version_ >= kOdometryVersion) odometry_ = in.number<std::uint32_t>();
     // Every keyframe that ever was is there, or left a tombstone.
     if (std::uint64_t{keyframes_} + erased_ != tables_.next_keyframe) {
       in.fail("keyframes that were neither kept nor erased");
@@ -193,6 +212,22 @@ class MapDecoder {
     if (!kind_) kind_ = frame.features.kind;
     if (frame.features.kind != *kind_) in.fail("descriptors of several kinds");
     keyframe.landmarks.resize(frame.size());
+  }
+
+  void read_odometry(ByteReader& in) {
+    const std::uint32_t id = read_id(in, next_odometry_, tables_.next_keyframe);
+    if (tables_.keyframes.find(id) == nullptr) in.fail("odometry of an unknown keyframe");
+    Odometry odometry;
+    odometry.previous = KeyframeId(in.number<std::uint32_t>());
+    odometry.motion.b_from_a = read_pose(in);
+    odometry.motion.covariance = read_covariance(in);
+    odometry.keypoints.resize(in.count<std::uint32_t>(sizeof(std::uint32_t)));
+    for (std::uint32_t& keypoint : odometry.keypoints) keypoint = in.number<std::uint32_t>();
+    if (!is_valid(odometry, tables_.keyframes.find(id)->landmarks.size())) {
+      in.fail("odometry without a covariance, or by keypoints that are not there");
+    }
+    tables_.keyframes.edit(id).odometry = std::make_shared<const Odometry>(std::move(odometry));
+    --odometry_;
   }
 
   void read_erased(ByteReader& in) {
@@ -250,8 +285,11 @@ class MapDecoder {
   MapTables tables_;
   CovisibilityChanges covisibility_;
   std::optional<DescriptorKind> kind_;
+  std::uint32_t version_;                                     // of the file
   std::uint32_t keyframes_ = 0, erased_ = 0, landmarks_ = 0;  // how many there shall be
+  std::uint32_t odometry_ = 0;                                // likewise, that are still to come
   std::uint32_t next_keyframe_ = 0, next_erased_ = 0, next_landmark_ = 0;  // least id to come
+  std::uint32_t next_odometry_ = 0;
 };
 
 // The first kinds come once each, the others as often as it takes.
@@ -276,7 +314,7 @@ MapTables decode_map(SectionFileReader& file, MapFileInfo& info) {
   const ByteReader end({}, file.path().string());
   if (file.sections().size() < kSingleSections) end.fail("sections are missing");
   check_order(file);
-  MapDecoder decoder;
+  MapDecoder decoder(file.version());
   for (std::size_t i = 0; i < file.sections().size(); ++i) {
     const std::string content = file.read(i);
     ByteReader in(content, file.place(i));

@@ -6,6 +6,7 @@
 #include "backend/map/frame_observations.h"
 #include "backend/map/ids.h"
 #include "backend/map/landmark.h"
+#include "backend/map/odometry.h"
 #include "cameras/geometry/rigid3d.h"
 
 namespace hybrid_slam {
@@ -37,6 +38,8 @@ struct NewKeyframe {
   std::vector<std::pair<std::uint32_t, Eigen::Vector3d>>
       new_points;        // keypoint, point in world: landmarks to be born
   KeyframeId reference;  // the keyframe it was tracked against: its parent while nothing is shared
+  // Null where there is none. Left out if it does not begin at the keyframe before.
+  std::shared_ptr<const Odometry> odometry{};
 };
 
 // A transaction: applied whole, in the order of the members below. It was made from a snapshot, so

@@ -58,6 +58,19 @@ void write(ByteWriter& out, const Keyframe& keyframe) {
   write(out, *keyframe.observations);
 }
 
+void write(ByteWriter& out, KeyframeId id, const Odometry& odometry) {
+  out.number(id.value);
+  out.number(odometry.previous.value);
+  write(out, odometry.motion.b_from_a);
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column <= row; ++column) {
+      out.number(odometry.motion.covariance(row, column));
+    }
+  }
+  out.number(static_cast<std::uint32_t>(odometry.keypoints.size()));
+  for (const std::uint32_t keypoint : odometry.keypoints) out.number(keypoint);
+}
+
 // The descriptor is that of one of the observations and follows from them; the numbers would too,
 // but only a machine that rounds alike finds the same ones again.
 void write(ByteWriter& out, const Landmark& landmark) {
@@ -112,10 +125,18 @@ void encode_map(const MapTables& tables, const MapFileInfo& info, SectionFileWri
        {tables.keyframes.size(), tables.erased.size(), tables.landmarks.size()}) {
     state.number(static_cast<std::uint32_t>(size));
   }
+  std::uint32_t odometry = 0;
+  tables.keyframes.for_each(
+      [&](std::uint64_t, const Keyframe& k) { odometry += k.odometry != nullptr ? 1 : 0; });
+  state.number(odometry);
   file.add(kStateSection, state.content());
 
   encode_table(tables.keyframes, kKeyframesSection, file,
                [](ByteWriter& out, std::uint64_t, const Keyframe& k) { write(out, k); });
+  encode_table(tables.keyframes, kOdometrySection, file,
+               [](ByteWriter& out, std::uint64_t, const Keyframe& k) {
+                 if (k.odometry != nullptr) write(out, k.id, *k.odometry);
+               });
   encode_table(tables.erased, kErasedSection, file,
                [](ByteWriter& out, std::uint64_t index, const ErasedKeyframe& erased) {
                  out.number(static_cast<std::uint32_t>(index));

@@ -7,18 +7,19 @@
 
 namespace hybrid_slam {
 
-inline constexpr SectionFileFormat kMapFileFormat{"\x89HSLMAP\n", 2, "map file"};
+inline constexpr SectionFileFormat kMapFileFormat{"\x89HSLMAP\n", 3, "map file", 2};
 
 // The sections in their order. The first three kinds come once; the others as often as it takes.
 inline constexpr std::string_view kInfoSection = "info";
 inline constexpr std::string_view kCamerasSection = "cameras";
 inline constexpr std::string_view kStateSection = "state";
 inline constexpr std::string_view kKeyframesSection = "keyframes";
+inline constexpr std::string_view kOdometrySection = "odometry";  // since version 3
 inline constexpr std::string_view kErasedSection = "erased";
 inline constexpr std::string_view kLandmarksSection = "landmarks";
-inline constexpr std::string_view kSectionOrder[] = {kInfoSection,   kCamerasSection,
-                                                     kStateSection,  kKeyframesSection,
-                                                     kErasedSection, kLandmarksSection};
+inline constexpr std::string_view kSectionOrder[] = {
+    kInfoSection,     kCamerasSection, kStateSection,    kKeyframesSection,
+    kOdometrySection, kErasedSection,  kLandmarksSection};
 
 // The one door to the tables for what stores a map and makes one from stored tables.
 struct MapFileAccess {

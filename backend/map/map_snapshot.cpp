@@ -64,6 +64,14 @@ std::vector<LandmarkId> MapSnapshot::changed_landmarks(const MapSnapshot& since)
   return ids;
 }
 
+std::vector<KeyframeId> MapSnapshot::changed_keyframes(const MapSnapshot& since) const {
+  std::vector<KeyframeId> ids;
+  tables_.keyframes.for_each_change(since.tables_.keyframes, [&](std::uint64_t index) {
+    ids.emplace_back(static_cast<std::uint32_t>(index));
+  });
+  return ids;
+}
+
 const Keyframe* MapSnapshot::find_frame(CameraId camera, std::int64_t frame_index) const {
   for (std::uint32_t id = tables_.next_keyframe; id-- > 0;) {
     const Keyframe* keyframe = find(KeyframeId(id));

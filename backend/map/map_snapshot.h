@@ -40,6 +40,10 @@ class MapSnapshot {
   // be as they were. Ascending. Costs what changed.
   std::vector<LandmarkId> changed_landmarks(const MapSnapshot& since) const;
 
+  // Keyframes that were born, changed (pose, links, landmarks, odometry) or erased since an earlier
+  // snapshot of the same map; some may be as they were. Ascending. Costs what changed.
+  std::vector<KeyframeId> changed_keyframes(const MapSnapshot& since) const;
+
   // The keyframe made from a camera's frame; null if there is none, or it was erased. Keyframes
   // enter in the order of their frames, so recent ones are found at once.
   const Keyframe* find_frame(CameraId camera, std::int64_t frame_index) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "backend/map/landmark_attributes.h"
+#include "backend/map/odometry.h"
 #include "backend/map/spanning_tree.h"
 
 namespace hybrid_slam {
@@ -107,6 +108,7 @@ void MapTransaction::erase_keyframe(KeyframeId id) {
   }
   covisibility_.write(tables_.keyframes);
   detach_from_tree(tables_, id);
+  detach_odometry(tables_, id);
   tables_.keyframes.erase(id.value);
 }
 

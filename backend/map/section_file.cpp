@@ -108,10 +108,12 @@ void SectionFileReader::read_header(const SectionFileFormat& format) {
   header_ = read_bytes(0, kHeaderSize);
   ByteReader header(header_, path_.string());
   if (header.bytes(kMagicSize) != format.magic) fail("no " + std::string(format.name));
-  const auto version = header.number<std::uint32_t>();
-  if (version != format.version) {
-    fail("version " + std::to_string(version) + " of the format, where this program knows " +
-         std::to_string(format.version));
+  version_ = header.number<std::uint32_t>();
+  if (version_ < format.oldest || version_ > format.version) {
+    const std::string known =
+        format.oldest < format.version ? std::to_string(format.oldest) + " to " : std::string();
+    fail("version " + std::to_string(version_) + " of the format, where this program knows " +
+         known + std::to_string(format.version));
   }
 }
 

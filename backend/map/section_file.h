@@ -28,7 +28,8 @@ namespace hybrid_slam {
 struct SectionFileFormat {
   std::string_view magic;  // 8 bytes
   std::uint32_t version = 1;
-  std::string_view name;  // what such a file is called in errors: "map file"
+  std::string_view name;           // what such a file is called in errors: "map file"
+  std::uint32_t oldest = version;  // that is still read
 };
 
 struct Section {
@@ -65,6 +66,7 @@ class SectionFileReader {
   SectionFileReader(const std::filesystem::path& path, const SectionFileFormat& format);
 
   const std::filesystem::path& path() const { return path_; }
+  std::uint32_t version() const { return version_; }  // that the file has
   const std::vector<Section>& sections() const { return sections_; }
 
   // The content of a section. Allocates no more than kMaxSectionSize, nor more than a fixed
@@ -83,6 +85,7 @@ class SectionFileReader {
   std::filesystem::path path_;
   std::ifstream file_;
   std::uint64_t size_ = 0;
+  std::uint32_t version_ = 0;
   std::string header_;
   std::vector<Section> sections_;
   std::vector<std::uint64_t> offsets_;  // one per section

@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "backend/problem/odometry_constraints.h"
+
 namespace hybrid_slam {
 
 ProblemConfig make_full_bundle(const MapSnapshot& map, const FullBundleOptions& options) {
@@ -12,6 +14,7 @@ ProblemConfig make_full_bundle(const MapSnapshot& map, const FullBundleOptions& 
   config.variable_poses = map.keyframe_ids();
   std::erase(config.variable_poses, map.origin());
   config.variable_landmarks = map.landmark_ids();
+  config.constraints = odometry_constraints(map, config.variable_poses);
   for (std::uint32_t i = 0; options.refine_intrinsics && i < map.camera_count(); ++i) {
     config.refined_cameras.emplace_back(i);
   }

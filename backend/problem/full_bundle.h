@@ -10,7 +10,7 @@ struct FullBundleOptions {
   bool refine_intrinsics = false;  // of all cameras; a stereo pair keeps its baseline
 };
 
-// Bundle adjustment of every keyframe but the origin and of every landmark.
+// Bundle adjustment of every keyframe but the origin and of every landmark, with the odometry.
 ProblemConfig make_full_bundle(const MapSnapshot& map, const FullBundleOptions& options);
 
 }  // namespace hybrid_slam

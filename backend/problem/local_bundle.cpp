@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "backend/problem/odometry_constraints.h"
+
 namespace hybrid_slam {
 
 namespace {
@@ -58,6 +60,7 @@ ProblemConfig make_local_bundle(const MapSnapshot& map, KeyframeId around,
        map.covisible(around, options.min_shared_landmarks, options.max_neighbours)) {
     inner.push_back(edge.id);
   }
+  if (const auto& odometry = map.at(around).odometry) inner.push_back(odometry->previous);
   sort_unique(inner);
   config.variable_landmarks = landmarks_seen_by(map, inner);
   config.fixed_poses = outer_observers(map, config.variable_landmarks, inner, options.max_fixed);
@@ -69,6 +72,7 @@ ProblemConfig make_local_bundle(const MapSnapshot& map, KeyframeId around,
     inner.erase(inner.begin());
   }
   config.variable_poses = std::move(inner);
+  config.constraints = odometry_constraints(map, config.variable_poses);
   return config;
 }
 

@@ -14,10 +14,10 @@ struct LocalBundleOptions {
   ProblemOptions problem;
 };
 
-// Local bundle adjustment: the keyframe and its covisible ones vary (stereo and fisheye mixed), and
-// so do all landmarks they see; other keyframes that see these landmarks are fixed, and so is the
-// origin. Where neither exists, the oldest keyframe is fixed instead. Empty if the keyframe is not
-// in the map.
+// Local bundle adjustment: the keyframe and its covisible ones vary (stereo and fisheye mixed),
+// that which its odometry begins at, and so do all landmarks they see; odometry joins them; other
+// keyframes that see these landmarks are fixed, and so is the origin. Where neither exists, the
+// oldest keyframe is fixed instead. Empty if the keyframe is not in the map.
 ProblemConfig make_local_bundle(const MapSnapshot& map, KeyframeId around,
                                 const LocalBundleOptions& options);
 

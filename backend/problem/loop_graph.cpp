@@ -66,6 +66,9 @@ ProblemConfig make_loop_graph(const MapSnapshot& map, const std::vector<PoseCons
     }
   }
   for (const auto& [a, b] : closed) remembered.add(a, b);
+  for (const KeyframeId id : map.keyframe_ids()) {
+    if (const auto& odometry = map.at(id).odometry) remembered.add(odometry->previous, id);
+  }
   for (PoseConstraint loop : loops) {
     if (loop.information.isIdentity(0)) {
       if (map.find(loop.a) == nullptr || map.find(loop.b) == nullptr) continue;

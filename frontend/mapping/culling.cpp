@@ -64,6 +64,13 @@ bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
   return counted > 0 && redundant > options.redundant_share * counted;
 }
 
+// Of its camera: tracking refers to it, and the odometry of the next one will begin there.
+bool is_newest(const MapSnapshot& map, const Keyframe& keyframe) {
+  const CameraId camera = keyframe.observations->camera;
+  const Keyframe* newest = map.find_frame(camera, map.newest_frame_index(camera));
+  return newest != nullptr && newest->id == keyframe.id;
+}
+
 }  // namespace
 
 std::string CullingOptions::validate() const {
@@ -121,7 +128,7 @@ MapEdit cull_keyframes(const MapSnapshot& map, KeyframeId keyframe, const Cullin
   MapEdit edit;
   for (const Covisible& covisible : map.at(keyframe).covisible) {
     const Keyframe& candidate = map.at(covisible.id);
-    if (candidate.id != map.origin() && !candidate.keep &&
+    if (candidate.id != map.origin() && !candidate.keep && !is_newest(map, candidate) &&
         is_redundant(map, candidate, edit.erased_keyframes, options)) {
       edit.erased_keyframes.push_back(candidate.id);
     }

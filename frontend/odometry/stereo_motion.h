@@ -32,6 +32,10 @@ struct StereoCorrespondence {
 
 struct StereoMotionSolution {
   Rigid3d current_from_previous;
+  // Of its left perturbation (translation, rotation). The noise is that of the inliers' residuals,
+  // one variance each of the place along the row, across it and of the disparity, alike in both
+  // frames. First order; what all matches are off by in common is not in it.
+  Matrix6d covariance;
   std::vector<int> inliers;  // indices of correspondences, ascending
 };
 

@@ -38,6 +38,7 @@ std::optional<StereoMotion> StereoOdometer::estimate(const StereoFeatures& previ
   if (!solution) return std::nullopt;
   StereoMotion motion;
   motion.current_from_previous = solution->current_from_previous;
+  motion.covariance = solution->covariance;
   motion.matches = static_cast<int>(matches.size());
   for (const int i : solution->inliers) {
     motion.inliers.push_back(matches[static_cast<std::size_t>(i)]);

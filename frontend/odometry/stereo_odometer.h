@@ -13,6 +13,7 @@ namespace hybrid_slam {
 
 struct StereoMotion {
   Rigid3d current_from_previous;
+  Matrix6d covariance = Matrix6d::Zero();  // of its left perturbation: see StereoMotionSolution
   std::vector<CircularMatch> inliers;
   int matches = 0;  // closed circles before RANSAC
 };

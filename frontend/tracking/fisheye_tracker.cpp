@@ -1,13 +1,19 @@
 #include "frontend/tracking/fisheye_tracker.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <utility>
 
 #include "frontend/tracking/stereo_keyframe.h"
 
 namespace hybrid_slam {
 namespace {
+
+constexpr double kSigmas = 3;  // that a prediction may be off by
 
 // Median distance of the landmarks that a frame shows [m]; infinite if there are none.
 double median_distance(const MapSnapshot& map, const Frame& frame) {
@@ -45,6 +51,7 @@ FisheyeTracker::FisheyeTracker(CameraId camera_id, const Calibrated<KannalaBrand
                                const FisheyeTrackerOptions& options,
                                std::shared_ptr<const KeyframeDatabase> places)
     : camera_id_(camera_id),
+      focal_(focal_length(Camera(camera))),
       options_(options),
       matcher_(camera_id, camera, options, std::move(places)),
       last_(camera_id) {
@@ -57,6 +64,7 @@ FisheyeTracker::FisheyeTracker(CameraId camera_id, const Calibrated<KannalaBrand
 TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, KeyframeId stereo_reference,
                                    bool allow_keyframe) {
   last_.follow(map);
+  bool certain = false;
   TrackedFrame result;
   result.frame_index = frame.index;
   result.time = frame.time;
@@ -70,10 +78,11 @@ TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, Keyframe
       result.cam_from_reference =
           frame.cam_from_world * inverse(map.cam_from_world(match->reference));
       result.inliers = match->inliers;
+      certain = is_certain(map, frame, match->information);
       result.counts = std::move(match->counts);
     }
   }
-  if (result.tracked() && allow_keyframe && !last_.waits_for_keyframe() &&
+  if (result.tracked() && allow_keyframe && !last_.waits_for_keyframe() && certain &&
       wants_keyframe(frame, map, result)) {
     result.keyframe = NewKeyframe{make_observations(camera_id_, frame),
                                   frame.cam_from_world,
@@ -100,6 +109,20 @@ std::vector<KeyframeId> FisheyeTracker::candidates(const MapSnapshot& map,
   }
   add(stereo_reference);
   return keyframes;
+}
+
+// Whether the place is known well enough for what a keyframe is used for: landmarks at the distance
+// of those it shows are looked for within the local map's radius of where it predicts them. No
+// odometer holds it if it is not.
+bool FisheyeTracker::is_certain(const MapSnapshot& map, const Frame& frame,
+                                const Matrix6d& information) const {
+  const Matrix6d covariance = information.inverse();
+  if (!covariance.allFinite()) return false;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> place(covariance.topLeftCorner<3, 3>(),
+                                                             Eigen::EigenvaluesOnly);
+  const double sigma = std::sqrt(place.eigenvalues()[2]);
+  const double at_radius = options_.local_map_radius * median_distance(map, frame) / focal_;
+  return kSigmas * sigma <= at_radius;
 }
 
 bool FisheyeTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,

@@ -56,22 +56,32 @@ FeatureView MapMatcher::view_of(const Frame& frame) const {
 
 int MapMatcher::refine(const MapSnapshot& map, Frame& frame,
                        std::span<const PoseObservation> others) const {
+  refine_with(options_.pose, map, frame, others);
+  return static_cast<int>(valid_ids(frame.landmarks).size());
+}
+
+void MapMatcher::keep_agreeing(const MapSnapshot& map, Frame& frame) const {
+  PoseRefinementOptions test_alone = options_.pose;
+  test_alone.rounds = 1;
+  test_alone.iterations = 0;
+  refine_with(test_alone, map, frame, {});
+}
+
+PoseRefinementResult MapMatcher::refine_with(const PoseRefinementOptions& options,
+                                             const MapSnapshot& map, Frame& frame,
+                                             std::span<const PoseObservation> others) const {
   std::vector<std::size_t> keypoint;
   auto observations = pose_observations(map, frame.features.left, frame.features.u_right,
                                         frame.landmarks, keypoint);
   observations.insert(observations.end(), others.begin(), others.end());
-  const auto refined = refine_pose(camera_, frame.cam_from_world, observations, options_.pose);
+  auto refined = refine_pose(camera_, frame.cam_from_world, observations, options);
   std::vector<LandmarkId> kept(frame.size());
-  int inliers = 0;
   for (std::size_t i = 0; i < keypoint.size(); ++i) {
-    if (refined.inlier[i]) {
-      kept[keypoint[i]] = frame.landmarks[keypoint[i]];
-      ++inliers;
-    }
+    if (refined.inlier[i]) kept[keypoint[i]] = frame.landmarks[keypoint[i]];
   }
   frame.landmarks = std::move(kept);
   frame.cam_from_world = refined.cam_from_world;
-  return inliers;
+  return refined;
 }
 
 int MapMatcher::match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids,
@@ -107,13 +117,18 @@ std::optional<MapMatcher::LocalMapMatch> MapMatcher::match_local_map(
   matcher.radius = options_.local_map_radius;
   assign(match_predictions(map, view_of(frame), without(predictions, frame), &taken, matcher),
          frame);
-  refine(map, frame);
+  match.information = refine_with(options_.pose, map, frame, {}).information;
+  const std::vector<Keypoint> keypoints = frame.features.left.keypoints;
+  const std::vector<float> u_right = frame.features.u_right;
   if (refiner_.refine(map, frame) > 0) {
-    refine(map, frame);
+    match.information = refine_with(options_.pose, map, frame, {}).information;
   }
   match.counts.found = valid_ids(frame.landmarks);
   match.inliers = static_cast<int>(match.counts.found.size());
   if (match.inliers < min_inliers) {
+    frame.features.left.keypoints = keypoints;
+    frame.features.u_right = u_right;
+    frame.aligned.clear();
     return std::nullopt;
   }
   return match;

@@ -56,6 +56,9 @@ class MapMatcher {
   int refine(const MapSnapshot& map, Frame& frame,
              std::span<const PoseObservation> others = {}) const;
 
+  // Drops the landmarks that disagree with the frame's pose, which stays as it is.
+  void keep_agreeing(const MapSnapshot& map, Frame& frame) const;
+
   // Looks for landmarks in windows of `radius` [px] around their projections, instead of those that
   // the frame has. Returns how many were found; nothing is optimised.
   int match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids, double radius,
@@ -64,11 +67,13 @@ class MapMatcher {
   struct LocalMapMatch {
     KeyframeId reference;  // shares most landmarks with the frame, of either camera
     int inliers = 0;
-    MapEdit counts;  // found and visible landmarks
+    Matrix6d information;  // of the pose, given the landmarks; as of PoseRefinementResult
+    MapEdit counts;        // found and visible landmarks
   };
 
   // Adds the landmarks of keyframes around `seeds`, at the local map's radius, aligns patches and
-  // optimises. None with fewer than `min_inliers`, or where nothing is around.
+  // optimises. None with fewer than `min_inliers`, or where nothing is around: then the frame's
+  // keypoints are as before, its pose and its landmarks are those that were not believed.
   std::optional<LocalMapMatch> match_local_map(const MapSnapshot& map,
                                                const std::vector<LandmarkId>& seeds,
                                                int min_inliers, Frame& frame) const;
@@ -91,6 +96,8 @@ class MapMatcher {
   double shading() const { return refiner_.shading(); }
 
  private:
+  PoseRefinementResult refine_with(const PoseRefinementOptions& options, const MapSnapshot& map,
+                                   Frame& frame, std::span<const PoseObservation> others) const;
   bool relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
                   const KeyframeMatcher& match, Frame& frame) const;
   bool find_place(const MapSnapshot& map, std::span<const KeyframeId> tried, Frame& frame) const;

@@ -5,10 +5,18 @@
 #include <stdexcept>
 #include <utility>
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "cameras/geometry/se3.h"
 #include "frontend/tracking/stereo_keyframe.h"
 
 namespace hybrid_slam {
 namespace {
+
+// Squared distance between the odometer's pose and the map's, in standard deviations, beyond which
+// one of the two is wrong: chi2 of 6 degrees of freedom, one frame in a million.
+constexpr double kMaxDisagreement = 38.3;
 
 // Share of what the odometer finds again of the last frame, below which the map shows little.
 constexpr double kFewLandmarks = 0.25;
@@ -16,6 +24,15 @@ constexpr double kFewLandmarks = 0.25;
 int count_valid(const std::vector<LandmarkId>& ids) {
   return static_cast<int>(
       std::count_if(ids.begin(), ids.end(), [](LandmarkId id) { return id.valid(); }));
+}
+
+// Whether the motion from the last frame leads to where the map has the present one. The map's
+// information is that of one pose; both have about the same.
+bool agrees(const StereoMotion& motion, const Rigid3d& predicted, const Rigid3d& by_map,
+            const Matrix6d& information) {
+  const Vector6d off = se3_log(by_map * inverse(predicted));
+  const Matrix6d covariance = motion.covariance + 2 * information.inverse();
+  return off.dot(covariance.ldlt().solve(off)) <= kMaxDisagreement;
 }
 
 void clear(Frame& frame) { frame.landmarks.assign(frame.size(), LandmarkId()); }
@@ -59,7 +76,7 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
 
 TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allow_keyframe) {
   if (!map.origin().valid()) {
-    TrackedFrame result = initialize(frame);
+    TrackedFrame result = initialize(frame, map);
     return remember(map, std::move(frame), std::move(result));
   }
   last_.follow(map);
@@ -79,7 +96,11 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
         clear(frame);
       }
     }
-    if (track_local_map(frame, map, options_.min_local_map_inliers, result)) {
+    const auto information = track_local_map(frame, map, options_.min_local_map_inliers, result);
+    const bool believed =
+        motion && (!information || agrees(*motion, predicted, frame.cam_from_world, *information));
+    chain_.add(believed ? motion : std::nullopt);
+    if (information) {
       result.source = PoseSource::kLocalMap;
       if (motion && result.inliers < kFewLandmarks * result.odometer_inliers) {
         result.inliers = matcher_.refine(map, frame, points_of_last_frame(*motion, frame));
@@ -87,6 +108,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
       }
     } else if (result.odometer_inliers >= options_.min_odometer_inliers) {
       frame.cam_from_world = predicted;
+      matcher_.keep_agreeing(map, frame);
       result.reference = last_.reference();
       result.source = PoseSource::kOdometer;
     }
@@ -99,13 +121,13 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
     result.cam_from_reference =
         frame.cam_from_world * inverse(map.cam_from_world(result.reference));
     if (allow_keyframe && !last_.waits_for_keyframe() && wants_keyframe(frame, map, result)) {
-      result.keyframe = make_keyframe(frame, result.reference);
+      result.keyframe = make_keyframe(frame, map, result.reference);
     }
   }
   return remember(map, std::move(frame), std::move(result));
 }
 
-TrackedFrame StereoTracker::initialize(Frame& frame) const {
+TrackedFrame StereoTracker::initialize(Frame& frame, const MapSnapshot& map) const {
   TrackedFrame result;
   result.frame_index = frame.index;
   result.time = frame.time;
@@ -117,7 +139,7 @@ TrackedFrame StereoTracker::initialize(Frame& frame) const {
     return result;
   }
   result.source = PoseSource::kInitialization;
-  result.keyframe = make_keyframe(frame, KeyframeId());
+  result.keyframe = make_keyframe(frame, map, KeyframeId());
   return result;
 }
 
@@ -198,20 +220,26 @@ bool StereoTracker::track_reference(Frame& frame, const MapSnapshot& map) const 
          matcher_.refine(map, frame) >= options_.min_pose_inliers;
 }
 
-bool StereoTracker::track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers,
-                                    TrackedFrame& result) const {
+// The information of the pose that was found; none if that is not believed.
+std::optional<Matrix6d> StereoTracker::track_local_map(Frame& frame, const MapSnapshot& map,
+                                                       int min_inliers,
+                                                       TrackedFrame& result) const {
   std::vector<LandmarkId> seeds = valid_ids(frame.landmarks);
   if (seeds.empty()) {
     seeds = valid_ids(last_.frame().landmarks);
   }
+  const Keyframe* reference = map.find(last_.reference());
+  if (seeds.empty() && reference != nullptr) {
+    seeds = valid_ids(reference->landmarks);
+  }
   auto match = matcher_.match_local_map(map, seeds, min_inliers, frame);
   if (!match) {
-    return false;
+    return std::nullopt;
   }
   result.reference = match->reference;
   result.inliers = match->inliers;
   result.counts = std::move(match->counts);
-  return true;
+  return match->information;
 }
 
 bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
@@ -236,9 +264,13 @@ bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);
 }
 
-NewKeyframe StereoTracker::make_keyframe(const Frame& frame, KeyframeId reference) const {
-  return make_stereo_keyframe(camera_id_, camera_, frame, reference, close_depth(),
-                              options_.min_new_points);
+NewKeyframe StereoTracker::make_keyframe(const Frame& frame, const MapSnapshot& map,
+                                         KeyframeId reference) const {
+  NewKeyframe keyframe = make_stereo_keyframe(camera_id_, camera_, frame, reference, close_depth(),
+                                              options_.min_new_points);
+  const Keyframe* last = map.find_frame(camera_id_, last_.keyframe_frame());
+  if (last != nullptr) keyframe.odometry = chain_.odometry(last->id);
+  return keyframe;
 }
 
 int StereoTracker::share_of_features(const Frame& frame, double share) const {
@@ -247,8 +279,12 @@ int StereoTracker::share_of_features(const Frame& frame, double share) const {
 }
 
 TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, TrackedFrame result) {
+  if (!last_.tracked()) chain_.add(std::nullopt);
   if (result.tracked()) matcher_.learn_shading(map, frame);
-  if (result.keyframe) matcher_.remember_keyframe(frame);
+  if (result.keyframe) {
+    chain_.begin();
+    matcher_.remember_keyframe(frame);
+  }
   last_.remember(std::move(frame), result);
   return result;
 }

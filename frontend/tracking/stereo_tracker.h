@@ -7,6 +7,7 @@
 
 #include "backend/map/map_snapshot.h"
 #include "frontend/odometry/disparity_calibrator.h"
+#include "frontend/odometry/odometry_chain.h"
 #include "frontend/odometry/stereo_odometer.h"
 #include "frontend/tracking/frame.h"
 #include "frontend/tracking/last_frame.h"
@@ -46,17 +47,17 @@ class StereoTracker {
   TrackedFrame track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);
 
  private:
-  TrackedFrame initialize(Frame& frame) const;
+  TrackedFrame initialize(Frame& frame, const MapSnapshot& map) const;
   void correct_disparities(Frame& frame) const;
   std::optional<StereoMotion> predict(Frame& frame, TrackedFrame& result);
   std::vector<PoseObservation> points_of_last_frame(const StereoMotion& motion,
                                                     const Frame& frame) const;
   bool track_last_frame(Frame& frame, const MapSnapshot& map, TrackedFrame& result) const;
   bool track_reference(Frame& frame, const MapSnapshot& map) const;
-  bool track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers,
-                       TrackedFrame& result) const;
+  std::optional<Matrix6d> track_local_map(Frame& frame, const MapSnapshot& map, int min_inliers,
+                                          TrackedFrame& result) const;
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
-  NewKeyframe make_keyframe(const Frame& frame, KeyframeId reference) const;
+  NewKeyframe make_keyframe(const Frame& frame, const MapSnapshot& map, KeyframeId reference) const;
   double close_depth() const { return options_.close_baselines * baseline(camera_); }
   int share_of_features(const Frame& frame, double share) const;
   TrackedFrame remember(const MapSnapshot& map, Frame frame, TrackedFrame result);
@@ -65,6 +66,7 @@ class StereoTracker {
   Camera camera_;
   StereoTrackerOptions options_;
   StereoOdometer odometer_;
+  OdometryChain chain_;
   DisparityCalibrator disparity_;
   MapMatcher matcher_;
   LastFrame last_;

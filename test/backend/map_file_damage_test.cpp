@@ -22,7 +22,9 @@ class SavedMap {
     options.times = 6;
     options.landmarks = 150;
     options.fisheye = true;
-    FilledMap filled = fill_map(make_synthetic_scene(options), {});
+    FillOptions fill;
+    fill.odometry = true;
+    FilledMap filled = fill_map(make_synthetic_scene(options), fill);
     MapEdit edit;
     edit.erased_keyframes = {filled.keyframes[4], filled.keyframes[5]};
     filled.map.apply(edit);
@@ -145,8 +147,12 @@ TEST_CASE("a damaged file is refused with its name, the place and the reason") {
     refused_as("no map file");
   }
   SECTION("of a later version") {
-    bytes[8] = 3;
-    refused_as("version 3 of the format, where this program knows 2");
+    bytes[8] = 4;
+    refused_as("version 4 of the format, where this program knows 2 to 3");
+  }
+  SECTION("of an earlier version") {
+    bytes[8] = 1;
+    refused_as("version 1 of the format, where this program knows 2 to 3");
   }
   SECTION("a byte changed") {
     bytes[bytes.size() / 2] ^= 4;
@@ -201,7 +207,7 @@ TEST_CASE("sections that are missing, doubled or out of order are refused") {
     CHECK_FALSE(refusal(saved.path()).empty());
   };
   const SavedMap::Sections& all = saved.sections();
-  REQUIRE(all.size() == 6);
+  REQUIRE(all.size() == 7);
   for (std::size_t i = 0; i < all.size(); ++i) {
     INFO("section " << all[i].first);
     auto sections = all;
@@ -230,6 +236,7 @@ TEST_CASE("a value out of range is refused with the section and the reason") {
   std::string& keyframes = saved.content(sections, kKeyframesSection);
   std::string& landmarks = saved.content(sections, kLandmarksSection);
   std::string& state = saved.content(sections, kStateSection);
+  std::string& odometry = saved.content(sections, kOdometrySection);
   // Places in the first keyframe: id 0, parent 4, keep 8, pose 9, camera 65, frame 69, time 77,
   // kind 85, right 86, count 87, keypoints from 91.
   SECTION("pose") {
@@ -282,6 +289,20 @@ TEST_CASE("a value out of range is refused with the section and the reason") {
     put(landmarks, 80, std::uint32_t{100000});
     refused_as(kLandmarksSection, "observation by a keypoint that does not exist");
   }
+  // In the first odometry: id 0, previous 4, motion 8, covariance 64, count 232, keypoints from
+  // 236.
+  SECTION("odometry of a keyframe that is not there") {
+    put(odometry, 0, std::uint32_t{4});  // erased
+    refused_as(kOdometrySection, "odometry of an unknown keyframe");
+  }
+  SECTION("covariance") {
+    put(odometry, 64, -1.0);
+    refused_as(kOdometrySection, "odometry without a covariance");
+  }
+  SECTION("keypoint of odometry") {
+    put(odometry, 236, std::uint32_t{100000});
+    refused_as(kOdometrySection, "odometry without a covariance, or by keypoints");
+  }
   SECTION("id") {
     put(landmarks, 0, std::uint32_t{1} << 30);
     refused_as(kLandmarksSection, "id out of order or out of range");
@@ -307,6 +328,10 @@ TEST_CASE("a map that contradicts itself is refused") {
   SECTION("a reference that does not see the landmark") {
     put(landmarks, 28, std::uint32_t{4});
     refused_as("landmark 0: not seen by its reference");
+  }
+  SECTION("odometry from elsewhere than the keyframe before") {
+    put(saved.content(sections, kOdometrySection), 4, std::uint32_t{7});
+    refused_as("keyframe 2: odometry that does not begin at the keyframe before");
   }
   SECTION("a tree with a circle") {
     const std::size_t second =

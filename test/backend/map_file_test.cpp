@@ -24,6 +24,7 @@ FilledMap make_map(bool stereo, bool fisheye) {
   noise.rotation_noise = 0.01;
   noise.translation_noise = 0.02;
   noise.point_noise = 0.05;
+  noise.odometry = true;
   return fill_map(make_synthetic_scene(options), noise);
 }
 
@@ -115,6 +116,29 @@ TEST_CASE("frames that are all alike come back, though they compress beyond what
   map.add_camera(synthetic_fisheye_camera());
   for (int i = 0; i < 20; ++i) map.add_keyframe({frame, {}, {}, {}, map.view().origin()});
   check_round_trip(map);
+}
+
+// Made by map_optimizer of the last program that wrote version 2.
+TEST_CASE(
+    "a map file of version 2 is still read, and saved again it is one of the present version") {
+  const std::filesystem::path path = std::filesystem::path(HYBRID_SLAM_MAPS) / "version_2.hslam";
+  REQUIRE(read_text(path).substr(8, 1) == "\2");
+  LoadedMap loaded = load_map(path);
+  CHECK(loaded.info.program == "map_optimizer");
+  const MapSnapshot& map = loaded.map.view();
+  REQUIRE(map.keyframe_count() == 3);
+  REQUIRE(map.landmark_count() == 12);
+  std::size_t observations = 0;
+  for (const LandmarkId id : map.landmark_ids()) observations += map.at(id).observations.size();
+  CHECK(observations == 36);
+  // The truth: 0.3 m to the right from keyframe to keyframe.
+  const Rigid3d& last = map.at(KeyframeId(2)).cam_from_world;
+  CHECK((inverse(last).translation() - Eigen::Vector3d(0.6, 0, 0)).norm() < 0.03);
+  CHECK(map.at(KeyframeId(2)).odometry == nullptr);
+  const TempFolder folder;
+  save_map(folder.path() / "again", map, loaded.info);
+  CHECK(read_text(folder.path() / "again").substr(8, 1) == "\3");
+  check_same_map(map, load_map(folder.path() / "again").map.view());
 }
 
 TEST_CASE("what cannot be written is an OutputError that leaves nothing behind") {

@@ -23,11 +23,17 @@ bool same_frame(const FrameObservations& a, const FrameObservations& b) {
          same_bits(a.u_right, b.u_right);
 }
 
+bool same_odometry(const Odometry* a, const Odometry* b) {
+  if (a == nullptr || b == nullptr) return a == b;
+  return a->previous == b->previous && a->motion.b_from_a.params == b->motion.b_from_a.params &&
+         a->motion.covariance == b->motion.covariance && a->keypoints == b->keypoints;
+}
+
 bool same_keyframe(const Keyframe& a, const Keyframe& b) {
   return a.id == b.id && same_frame(*a.observations, *b.observations) &&
          a.cam_from_world.params == b.cam_from_world.params && a.landmarks == b.landmarks &&
          a.covisible == b.covisible && a.parent == b.parent && a.children == b.children &&
-         a.keep == b.keep;
+         a.keep == b.keep && same_odometry(a.odometry.get(), b.odometry.get());
 }
 
 bool same_landmark(const Landmark& a, const Landmark& b) {

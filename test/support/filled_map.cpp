@@ -67,10 +67,26 @@ class MapFiller {
       made.landmarks[k] = filled_.landmarks[landmark];
       if (!filled_.landmarks[landmark].valid()) unborn.push_back({landmark, k});
     }
+    if (options_.odometry && !filled_.keyframes.empty()) made.odometry = odometry_to(frame);
     const KeyframeId id = filled_.map.add_keyframe(made);
     filled_.frames.push_back(index);
     filled_.keyframes.push_back(id);
     give_birth(*frame.observations, id, unborn);
+  }
+
+  // From the keyframe of the same camera before it.
+  std::shared_ptr<const Odometry> odometry_to(const SyntheticFrame& frame) const {
+    for (std::size_t i = filled_.keyframes.size(); i-- > 0;) {
+      const SyntheticFrame& before = scene_.frames[filled_.frames[i]];
+      if (before.observations->camera != frame.observations->camera) continue;
+      Odometry made{filled_.keyframes[i],
+                    {frame.cam_from_world * inverse(before.cam_from_world),
+                     Vector6d::Constant(1e-5).asDiagonal()},
+                    {}};
+      for (std::uint32_t k = 0; k < frame.landmark.size(); ++k) made.keypoints.push_back(k);
+      return std::make_shared<const Odometry>(std::move(made));
+    }
+    return nullptr;
   }
 
   void give_birth(const FrameObservations& frame, KeyframeId id,

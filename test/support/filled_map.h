@@ -15,6 +15,7 @@ struct FillOptions {
   double rotation_noise = 0;     // of the initial poses, the origin left out [rad]
   double translation_noise = 0;  // [m]
   double point_noise = 0;        // of the initial points [m]
+  bool odometry = false;         // keyframes have one, without noise, by all keypoints
   std::uint64_t seed = 7;
 
   // A place that the map holds twice. From this frame of the scene on nothing of the map before is

@@ -1,5 +1,7 @@
 #include "test/support/random_edits.h"
 
+#include <algorithm>
+
 #include "cameras/geometry/se3.h"
 
 namespace hybrid_slam {
@@ -67,7 +69,20 @@ void RandomEdits::add_keyframe() {
   for (LandmarkId& id : made.landmarks) {
     if (random_.below(3) == 0) id = landmark();
   }
+  Odometry odometry{random_.below(2) == 0 ? keyframe() : newest_like(*like),
+                    {random_.rigid(1, 1), Vector6d::Constant(1e-4).asDiagonal()},
+                    {0, 2}};
+  made.odometry = std::make_shared<const Odometry>(std::move(odometry));
   filled_.keyframes.push_back(filled_.map.add_keyframe(made));
+}
+
+// The newest living keyframe of the same camera.
+KeyframeId RandomEdits::newest_like(const Keyframe& keyframe) const {
+  const std::vector<KeyframeId> ids = filled_.map.view().keyframe_ids();
+  const auto same = std::find_if(ids.rbegin(), ids.rend(), [&](KeyframeId id) {
+    return filled_.map.view().at(id).observations->camera == keyframe.observations->camera;
+  });
+  return same != ids.rend() ? *same : KeyframeId();
 }
 
 void RandomEdits::move() {

@@ -21,6 +21,7 @@ class RandomEdits {
   Observation observation();
   LandmarkObservation existing();
   void add_keyframe();
+  KeyframeId newest_like(const Keyframe& keyframe) const;
   void move();
 
   FilledMap& filled_;

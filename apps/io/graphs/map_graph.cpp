@@ -9,6 +9,7 @@
 #include "backend/map/map_file.h"
 #include "backend/map/map_file_format.h"
 #include "backend/problem/map_graph.h"
+#include "backend/problem/odometry_constraints.h"
 
 namespace hybrid_slam {
 
@@ -21,6 +22,7 @@ FactorGraph whole_graph(const MapSnapshot& map) {
   ProblemConfig config;
   config.variable_poses = map.keyframe_ids();
   config.variable_landmarks = map.landmark_ids();
+  config.constraints = odometry_constraints(map, config.variable_poses);
   FactorGraph graph = make_graph(map, config).graph;
   for (std::size_t i = 0; i < graph.frames.size(); ++i) {
     graph.frames[i].fixed = config.variable_poses[i] == map.origin();

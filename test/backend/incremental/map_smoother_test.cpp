@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "backend/backend.h"
+#include "backend/problem/odometry_constraints.h"
 #include "backend/problem/solve_graph.h"
 #include "test/support/random_edits.h"
 
@@ -38,12 +39,34 @@ std::vector<Place> observed(const FactorGraph& graph) {
   return places;
 }
 
-TEST_CASE("A smoother holds the observations that the map holds, after any edits") {
+bool has_motion(const std::vector<GraphEdge>& edges, const Rigid3d& motion) {
+  return std::any_of(edges.begin(), edges.end(), [&](const GraphEdge& edge) {
+    return (edge.a_from_b.params - motion.params).norm() < 1e-12;
+  });
+}
+
+// Every edge is odometry of the map, and what odometry says beyond the landmarks is an edge.
+void check_odometry(const MapSnapshot& map, const FactorGraph& graph) {
+  std::size_t edges = 0;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const Keyframe& keyframe = map.at(id);
+    if (keyframe.odometry == nullptr) continue;
+    const bool there = has_motion(graph.edges, keyframe.odometry->motion.b_from_a);
+    edges += there ? 1 : 0;
+    if (unshared(map, keyframe) > 0.11) CHECK(there);
+  }
+  CHECK(edges == graph.edges.size());
+}
+
+TEST_CASE(
+    "A smoother holds the observations and the odometry that the map holds, after any edits") {
   SyntheticSceneOptions options;
   options.times = 12;
   options.landmarks = 600;
   options.fisheye = true;
-  FilledMap filled = fill_map(make_synthetic_scene(options), {});
+  FillOptions fill;
+  fill.odometry = true;
+  FilledMap filled = fill_map(make_synthetic_scene(options), fill);
   RandomEdits edits(filled, 5);
   MapSmootherOptions lenient;  // only what does not project is an outlier
   lenient.solver.chi2_mono = lenient.solver.chi2_stereo = 1e300;
@@ -59,8 +82,64 @@ TEST_CASE("A smoother holds the observations that the map holds, after any edits
       filled.map.apply(outliers);
     } while (!result.outliers.empty());
     CHECK((observed(smoother.solver().graph()) == observed(filled.map.view())));
+    check_odometry(filled.map.view(), smoother.solver().graph());
     for (int k = 0; k < 10; ++k) edits.step();
   }
+}
+
+TEST_CASE("Odometry weighs as much as the landmarks leave to it, and less where they come") {
+  SyntheticSceneOptions options;
+  options.times = 24;
+  options.landmarks = 1500;
+  FillOptions fill;
+  fill.odometry = true;
+  FilledMap filled = fill_map(make_synthetic_scene(options), fill);
+  const KeyframeId id = filled.keyframes[2];
+  const auto weight = [&](const MapSmoother& smoother) {
+    const Keyframe& keyframe = filled.map.view().at(id);
+    const auto whole = odometry_constraint(keyframe, 1);
+    for (const GraphEdge& edge : smoother.solver().graph().edges) {
+      if (!has_motion({edge}, keyframe.odometry->motion.b_from_a)) continue;
+      return edge.information.trace() / whole->information.topLeftCorner<6, 6>().trace();
+    }
+    return 0.0;
+  };
+  MapSmoother smoother(MapSmootherOptions{});
+  smoother.update(filled.map.snapshot(), filled.keyframes.back());
+  const double before = unshared(filled.map.view(), filled.map.view().at(id));
+  REQUIRE(before < 0.8);
+  CHECK(weight(smoother) == Approx(before));
+  MapEdit edit;
+  for (const LandmarkId landmark : filled.map.view().at(id).landmarks) {
+    if (landmark.valid()) edit.erased_landmarks.push_back(landmark);
+  }
+  filled.map.apply(edit);
+  smoother.update(filled.map.snapshot(), filled.keyframes.back());
+  CHECK(weight(smoother) == Approx(1));
+}
+
+TEST_CASE("An observation that was set aside and is taken in again is given back to the solver") {
+  SyntheticSceneOptions options;
+  options.times = 24;
+  options.landmarks = 1500;
+  options.outlier_rate = 0.02;
+  FilledMap filled = fill_map(make_synthetic_scene(options), {});
+  MapSmoother smoother(MapSmootherOptions{});
+  const KeyframeId newest = filled.keyframes.back();
+  const BundleResult result = smoother.update(filled.map.snapshot(), newest);
+  REQUIRE(result.outliers.size() > 3);
+  CHECK(observed(smoother.solver().graph()).size() + result.outliers.size() ==
+        observed(filled.map.view()).size());
+  // The map lets go of them and finds them again before the smoother looks.
+  MapEdit back;
+  back.erased_observations = result.outliers;
+  filled.map.apply(back);
+  back = {};
+  back.new_observations = result.outliers;
+  filled.map.apply(back);
+  const std::size_t held = observed(filled.map.view()).size();
+  smoother.update(filled.map.snapshot(), filled.keyframes[12]);  // which sees none of them
+  CHECK(observed(smoother.solver().graph()).size() == held);
 }
 
 // Grows a map as the pipeline does, from poses and points that are off.

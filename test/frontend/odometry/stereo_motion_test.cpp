@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include <Eigen/Cholesky>
 
 #include <catch2/catch.hpp>
 
@@ -182,6 +185,52 @@ TEST_CASE("stereo motion repeats itself for the same seed", "[odometry]") {
   REQUIRE(second);
   CHECK(first->current_from_previous.params == second->current_from_previous.params);
   CHECK(first->inliers == second->inliers);
+}
+
+// Normalised squared errors of many motions, by the covariance that comes with each.
+std::vector<double> normalized_errors(SceneOptions options, int runs) {
+  std::vector<double> errors;
+  for (int run = 0; run < runs; ++run) {
+    options.seed = static_cast<std::uint64_t>(run);
+    const Scene scene = make_scene(options);
+    const auto found = scene.solve({.ransac_iterations = 50});
+    REQUIRE(found);
+    const Vector6d off = se3_log(found->current_from_previous * inverse(scene.truth));
+    errors.push_back(off.dot(found->covariance.ldlt().solve(off)));
+  }
+  return errors;
+}
+
+TEST_CASE("stereo motion knows how far it may be off") {
+  // Mean of chi2 over its 6 degrees of freedom, over 400 runs: 1 with a standard deviation of 0.03.
+  for (const SceneOptions& options :
+       {SceneOptions{.count = 300, .noise = 0.3}, SceneOptions{.count = 300, .noise = 0.05},
+        SceneOptions{.count = 60, .noise = 0.3, .angle = 0.02, .distance = 0.2},
+        SceneOptions{.count = 300, .outlier_share = 0.3, .noise = 0.2, .distance = 1},
+        SceneOptions{.count = 30, .noise = 0.2}}) {
+    const std::vector<double> errors = normalized_errors(options, 400);
+    const double mean =
+        std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+    INFO(options.count << " points, noise " << options.noise << " px, up to " << options.distance
+                       << " m");
+    CHECK(mean / 6 > 0.8);
+    CHECK(mean / 6 < 1.2);
+    // Median of chi2 with 6 degrees of freedom: 5.35.
+    std::vector<double> sorted = errors;
+    std::nth_element(sorted.begin(), sorted.begin() + 200, sorted.end());
+    CHECK(sorted[200] / 5.348 > 0.8);
+    CHECK(sorted[200] / 5.348 < 1.2);
+  }
+}
+
+TEST_CASE("the covariance of a stereo motion is there without noise, too, and repeats itself") {
+  const Scene scene = make_scene({.count = 40});
+  const auto found = scene.solve();
+  REQUIRE(found);
+  CHECK(found->covariance == found->covariance.transpose());
+  CHECK(found->covariance.llt().info() == Eigen::Success);
+  CHECK(found->covariance.diagonal().maxCoeff() < 1e-6);
+  CHECK(found->covariance == scene.solve()->covariance);
 }
 
 TEST_CASE("stereo motion's options are checked", "[odometry]") {

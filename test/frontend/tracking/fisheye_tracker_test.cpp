@@ -1,6 +1,7 @@
 #include "frontend/tracking/fisheye_tracker.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <catch2/catch.hpp>
 
@@ -113,6 +114,48 @@ TEST_CASE("A fisheye keyframe is what was seen, without new points") {
   map.add_keyframe(*tracked.keyframe);
   CHECK(tracker.track(world.frame(11), map.view(), KeyframeId()).keyframe);
   CHECK(!tracker.track(world.frame(12), map.view(), KeyframeId(), false).keyframe);
+}
+
+// Of the map are left only landmarks within a small cone, which leave the place loose.
+TEST_CASE("A fisheye frame whose place is not certain becomes no keyframe") {
+  FisheyeTrackerOptions options;
+  options.keyframes.max_frames_between = 1;
+  options.keyframes.min_motion = 0;
+  options.keyframes.min_inliers = 0;
+  int tracked_frames = 0;
+  int keyframes = 0;
+  double worst_tracked = 0;
+  double worst_keyframe = 0;
+  FisheyeWorld world(false);
+  for (std::size_t moment = 9; moment < 40; moment += 5) {
+    for (const double cone : {0.05, 0.1, 0.2, 0.8}) {
+      world.filled = fill_map(world.scene, FillOptions{.stride = 8});
+      const SyntheticFrame& truth = world.truth(moment);
+      MapEdit edit;
+      for (const LandmarkId id : world.map().landmark_ids()) {
+        const Eigen::Vector3d in_cam = truth.cam_from_world * world.map().at(id).point_in_world;
+        const double off_axis =
+            std::acos(in_cam.normalized().dot(Eigen::Vector3d(0.3, 0, 1).normalized()));
+        if (off_axis > cone) edit.erased_landmarks.push_back(id);
+      }
+      world.filled.map.apply(edit);
+      FisheyeTracker tracker = world.tracker(options);
+      const TrackedFrame tracked = tracker.track(world.frame(moment), world.map(), KeyframeId());
+      if (!tracked.tracked()) continue;
+      ++tracked_frames;
+      const double error =
+          pose_scene::translation_error(tracked.cam_from_world, truth.cam_from_world);
+      worst_tracked = std::max(worst_tracked, error);
+      if (!tracked.keyframe) continue;
+      ++keyframes;
+      worst_keyframe = std::max(worst_keyframe, error);
+    }
+  }
+  CAPTURE(tracked_frames, keyframes, worst_tracked, worst_keyframe);
+  CHECK(keyframes > 5);
+  CHECK(keyframes < tracked_frames);
+  CHECK(worst_tracked > worst_keyframe);
+  CHECK(worst_keyframe < 0.03);
 }
 
 TEST_CASE("FisheyeTrackerOptions out of range are refused") {

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <set>
 
+#include <Eigen/Cholesky>
+
 #include <catch2/catch.hpp>
 
+#include "cameras/geometry/se3.h"
 #include "test/frontend/pose/pose_scene.h"
 #include "test/support/filled_map.h"
 #include "test/support/stereo_frame.h"
@@ -207,6 +210,54 @@ TEST_CASE("Where the map does not reach, odometry holds the track and asks for a
   CHECK_FALSE(lost.keyframe);
 }
 
+// A few landmarks of the map are wrong in common, by more than they are seen off: too few to be
+// believed, whatever they say.
+TEST_CASE("A keyframe by odometry takes nothing along of a pose that was rejected") {
+  for (const double shift : {0.02, 0.0}) {  // [m]
+    for (const std::size_t shared : {1, 4, 8, 15, 22, 29}) {
+      World world;
+      StereoTracker tracker = world.tracker();
+      REQUIRE(tracker.track(world.frame(9), world.map()).tracked());
+      REQUIRE(tracker.track(world.frame(10), world.map()).tracked());
+      const Frame next = world.frame(11);
+      MapEdit edit;
+      std::vector<std::pair<LandmarkId, Eigen::Vector3d>> moved;
+      const auto& seen = world.scene.frames[11].landmark;
+      std::set<LandmarkId> left;
+      for (const int index : seen) {
+        const LandmarkId id =
+            index < 0 ? LandmarkId() : world.filled.landmarks[static_cast<std::size_t>(index)];
+        if (id.valid() && left.size() < shared) left.insert(id);
+      }
+      for (const LandmarkId id : world.map().landmark_ids()) {
+        if (!left.contains(id)) {
+          edit.erased_landmarks.push_back(id);
+        } else {
+          moved.emplace_back(id, world.map().at(id).point_in_world + Eigen::Vector3d(shift, 0, 0));
+        }
+      }
+      world.filled.map.apply(edit);
+      world.filled.map.move({}, moved);
+      const TrackedFrame tracked = tracker.track(next, world.map());
+      INFO(shared << " landmarks, off by " << shift << " m");
+      REQUIRE(tracked.source == PoseSource::kOdometer);
+      REQUIRE(tracked.keyframe);
+      CHECK(pose_scene::translation_error(tracked.cam_from_world, world.true_pose(11)) < 0.005);
+      const std::size_t kept = valid_ids(tracked.keyframe->landmarks).size();
+      if (shift > 0) {
+        CHECK(kept == 0);
+      } else if (shared >= 8) {
+        CHECK(2 * kept > shared);
+      }
+      // Keypoints are where they were seen.
+      const auto& keypoints = tracked.keyframe->observations->features.keypoints;
+      for (std::size_t k = 0; k < keypoints.size(); ++k) {
+        CHECK(keypoints[k].x == next.features.left.keypoints[k].x);
+      }
+    }
+  }
+}
+
 // Tracks from frame 1 on until a keyframe is asked for, or to `last`.
 TrackedFrame track_until_keyframe(StereoTracker& tracker, const World& world, bool allow_keyframe,
                                   std::size_t last) {
@@ -216,6 +267,40 @@ TrackedFrame track_until_keyframe(StereoTracker& tracker, const World& world, bo
     REQUIRE(tracked.tracked());
   }
   return tracked;
+}
+
+TEST_CASE("A keyframe has the odometry from the one before, frames between included") {
+  World world(60);
+  StereoTracker tracker = world.tracker();
+  const auto add = [&](const TrackedFrame& made) {
+    REQUIRE(made.keyframe);
+    return world.filled.map.add_keyframe(*made.keyframe);
+  };
+  const TrackedFrame first = track_until_keyframe(tracker, world, true, 20);
+  CHECK(first.keyframe->odometry == nullptr);  // the map's keyframe is none of this tracker's
+  const KeyframeId first_id = add(first);
+  TrackedFrame second;
+  auto index = static_cast<std::size_t>(first.frame_index);
+  for (int held_back = 0; !second.keyframe; ++held_back) {
+    second = tracker.track(world.frame(++index), world.map(), held_back >= 3);
+  }
+  REQUIRE(second.frame_index > first.frame_index + 3);
+  REQUIRE(second.keyframe->odometry != nullptr);
+  const Odometry& odometry = *second.keyframe->odometry;
+  CHECK(odometry.previous == first_id);
+  const Rigid3d motion = world.true_pose(index) *
+                         inverse(world.true_pose(static_cast<std::size_t>(first.frame_index)));
+  const Vector6d off = se3_log(odometry.motion.b_from_a * inverse(motion));
+  CHECK(off.dot(odometry.motion.covariance.ldlt().solve(off)) < 22.5);  // chi2: 99.9 %
+  CHECK(odometry.motion.covariance.diagonal().cwiseSqrt().maxCoeff() < 0.02);
+  CHECK(static_cast<int>(odometry.keypoints.size()) == second.odometer_inliers);
+  const KeyframeId second_id = add(second);
+  CHECK(world.map().at(second_id).odometry != nullptr);
+  // A frame that the odometer cannot follow breaks the chain.
+  TrackedFrame third = tracker.track(without_right(world.frame(++index)), world.map());
+  REQUIRE(third.tracked());
+  while (!third.keyframe) third = tracker.track(world.frame(++index), world.map());
+  CHECK(third.keyframe->odometry == nullptr);
 }
 
 TEST_CASE("A keyframe is asked for where it is needed, if allowed, and once") {
