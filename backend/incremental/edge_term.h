@@ -17,7 +17,9 @@ struct EdgeTerm {
   void assemble(Front& front) const {
     for (std::size_t i = 0; i < variable; ++i) {
       const std::uint32_t slot = front.slot(poses[i]);
-      front.add(slot, slot, by_pose[i].transpose() * by_pose[i]);
+      const Matrix6d own = by_pose[i].transpose() * by_pose[i];
+      front.add(slot, slot, own);
+      front.add_scale(slot, own.diagonal());
       front.add_gradient(slot, by_pose[i].transpose() * residual);
     }
     if (variable == 2) {

@@ -20,6 +20,7 @@ class Front {
   Front(std::size_t poses, const std::vector<std::uint32_t>& slot_of)
       : matrix_(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(6 * poses + 1),
                                       static_cast<Eigen::Index>(6 * poses))),
+        scale_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(6 * poses))),
         slot_of_(&slot_of) {}
 
   std::uint32_t slot(std::uint32_t pose) const { return (*slot_of_)[pose]; }
@@ -39,10 +40,19 @@ class Front {
     matrix_.row(matrix_.rows() - 1).segment<6>(6 * slot) += gradient.transpose();
   }
 
+  // The size of what was added to the diagonal of H, before anything was eliminated from it: what
+  // is left there of this size times the precision of a double is rounding, and says nothing.
+  template <typename Derived>
+  void add_scale(std::uint32_t slot, const Eigen::MatrixBase<Derived>& diagonal) {
+    scale_.segment<6>(6 * slot) += diagonal;
+  }
+
   Eigen::MatrixXd& matrix() { return matrix_; }
+  Eigen::VectorXd& scale() { return scale_; }
 
  private:
   Eigen::MatrixXd matrix_;  // (6 n + 1) x 6 n
+  Eigen::VectorXd scale_;   // 6 n
   const std::vector<std::uint32_t>* slot_of_;
 };
 

@@ -106,7 +106,8 @@ Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
 }
 
 Eigen::Vector3d IncrementalSolver::displacement(const LandmarkTerm& landmark) const {
-  return landmark.displacement([this](std::uint32_t pose) { return tree_.delta(pose); });
+  return landmark.displacement([this](std::uint32_t pose) { return tree_.delta(pose); }) -
+         landmark.held_back;
 }
 
 // Where its anchor's motion, in full, took the point since it was linearised.
@@ -201,37 +202,23 @@ std::size_t IncrementalSolver::choose() {
   return chosen;
 }
 
-UpdateSummary IncrementalSolver::update() {
+UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
   UpdateSummary summary;
   credit_ = std::min(credit_ + options_.budget, options_.burst * options_.budget);
-  std::vector<std::uint32_t> linearized;
-  std::vector<std::uint32_t> moved;
   if (dirty_.empty() && touched_.empty()) summary.relinearized += choose();
-  for (int step = 0; step < options_.max_steps; ++step) {
-    if (dirty_.empty() && touched_.empty()) break;
-    linearized = std::exchange(dirty_, {});
-    for (const std::uint32_t term : linearized) {
-      linearize(term);
-      terms_[term].dirty = false;
-      const auto poses = poses_of(term);
-      touched_.insert(touched_.end(), poses.begin(), poses.end());
-    }
-    tree_.refactor(touched_, newest_, *this);
-    touched_.clear();
-    ++summary.steps;
-    summary.poses += tree_.last_poses();
-    summary.multiplications += tree_.last_cost();
-    moved.clear();
-    tree_.solve(options_.wildfire, moved);
-    for (const std::uint32_t pose : moved) fold(pose);
-    summary.moved.insert(summary.moved.end(), moved.begin(), moved.end());
-    check(linearized, moved);
-    if (step + 1 < options_.max_steps) summary.relinearized += choose();
+  for (int i = 0; i < options_.max_steps; ++i) {
+    if (dirty_.empty() && touched_.empty() && damped_.empty()) break;
+    summary.stopped = stop.stop_requested();
+    if (summary.stopped) break;
+    step(summary);
+    if (i + 1 < options_.max_steps) summary.relinearized += choose();
   }
-  newest_.clear();
   std::sort(summary.moved.begin(), summary.moved.end());
   summary.moved.erase(std::unique(summary.moved.begin(), summary.moved.end()), summary.moved.end());
-  summary.marginalized = slide_window();
+  if (!summary.stopped) {
+    newest_.clear();
+    summary.marginalized = slide_window();
+  }
   summary.pending = pending_.size();
   return summary;
 }

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "backend/incremental/edge_term.h"
 #include "backend/incremental/landmark_term.h"
 #include "backend/incremental/pose_tree.h"
 #include "backend/incremental/prior_term.h"
+#include "backend/incremental/robust_loss.h"
 #include "backend/incremental/world_tangent.h"
 #include "backend/problem/factor_graph.h"
 #include "backend/problem/problem_config.h"
@@ -47,10 +49,14 @@ struct IncrementalOptions {
 
 struct UpdateSummary {
   int steps = 0;
-  std::size_t poses = 0;                    // factored anew, over all steps
-  std::size_t relinearized = 0;             // terms
-  std::size_t pending = 0;                  // terms that wait to be linearised anew
-  std::vector<std::uint32_t> moved;         // poses whose estimate changed, ascending
+  int damped = 0;   // of the steps: those that would have raised the cost, and were shortened
+  int refused = 0;  // of the steps: those that would have raised the cost however short
+  bool stopped = false;
+  std::size_t undetermined = 0;      // directions that no term determines, and that were held
+  std::size_t poses = 0;             // factored anew, over all steps
+  std::size_t relinearized = 0;      // terms
+  std::size_t pending = 0;           // terms that wait to be linearised anew
+  std::vector<std::uint32_t> moved;  // poses whose estimate changed, ascending
   std::vector<std::uint32_t> marginalized;  // poses that no longer move, from now on; ascending
   double multiplications = 0;               // of the factorisation
 };
@@ -58,7 +64,8 @@ struct UpdateSummary {
 // Incremental smoothing of a graph that grows: see docs/backend.md. The graph persists: each term
 // keeps its linearisation, landmarks are eliminated in their terms, and the poses are solved by a
 // PoseTree, of which an update touches only what its terms concern. Gauss-Newton; the estimate of
-// everything is at hand at any time.
+// everything is at hand at any time. Steps are judged by the true cost, with the losses: none
+// raises it by more than linearisations may be off.
 class IncrementalSolver final : private TermSource {
  public:
   explicit IncrementalSolver(const IncrementalOptions& options);
@@ -80,8 +87,9 @@ class IncrementalSolver final : private TermSource {
   // in; conditional on what is fixed.
   Matrix6d covariance(std::uint32_t pose) const;
 
-  // Takes in what was added and removed since the last update.
-  UpdateSummary update();
+  // Takes in what was added and removed since the last update. Looks at `stop` between steps; what
+  // was left to do then waits for the next update.
+  UpdateSummary update(const std::stop_token& stop = {});
 
   Rigid3d pose(std::uint32_t index) const;
   Eigen::Vector3d point(std::uint32_t index) const;
@@ -108,8 +116,11 @@ class IncrementalSolver final : private TermSource {
     bool pending = false;     // its linearisation is too old, and waits for its turn
     double mismatch = 0;      // squared, as of the last check
     double squared_norm = 0;  // of its weighted residual, when it was evaluated last
+    double cost = 0;          // twice, with its losses, at the present estimate
+    double start_cost = 0;    // the same before the step at hand
     int rows = 0;
     std::uint64_t checked = 0;  // stamp of the last check
+    std::uint64_t step = 0;     // in which it was evaluated last
   };
 
   struct Pose {
@@ -118,6 +129,7 @@ class IncrementalSolver final : private TermSource {
     Vector6d folded_delta = Vector6d::Zero();
     std::uint32_t camera = GraphFrame::kNoCamera;
     bool fixed = false;
+    double damping = 0;  // see PoseTree::set_damping
     std::vector<std::uint32_t> terms;
   };
 
@@ -129,25 +141,41 @@ class IncrementalSolver final : private TermSource {
   std::uint32_t add_term(TermKind kind, std::uint32_t index);
   void mark_dirty(std::uint32_t term);
   void linearize(std::uint32_t term);
-  void linearize_edge(std::uint32_t index);
-  void linearize_landmark(std::uint32_t index);
-  bool linearize_view(const Eigen::Vector3d& point, LandmarkView& view) const;
+  // These return the term's cost.
+  double linearize_edge(std::uint32_t index);
+  double linearize_landmark(std::uint32_t index);
+  bool linearize_view(const Eigen::Vector3d& point, LandmarkView& view, double& cost) const;
   // A term's residual at the present estimate.
   struct Evaluation {
     double squared_norm = 0;      // of what the linearisation predicts: weighted
     double squared_mismatch = 0;  // of the difference to what its linearisation predicts
+    double cost = 0;              // twice, with the losses
     int rows = 0;
   };
-  // The square roots of the weights that losses give, by which residuals and derivatives count.
-  double edge_weight(std::uint32_t index, const Vector6d& residual) const;
-  double view_weight(const LandmarkView& view, const Eigen::Vector3d& residual) const;
+  RobustLoss edge_loss(std::uint32_t index) const;
+  RobustLoss view_loss(const LandmarkView& view) const;
   Vector6d edge_residual(std::uint32_t index) const;
   Evaluation evaluate_edge(std::uint32_t index) const;
   Evaluation evaluate_landmark(std::uint32_t index) const;
+  Evaluation evaluate_prior(std::uint32_t index) const;
   void evaluate(std::uint32_t term);
   void check(const std::vector<std::uint32_t>& linearized, const std::vector<std::uint32_t>& moved);
   std::size_t choose();
   double typical() const;
+
+  // What a step may have to take back.
+  struct Moved {
+    std::uint32_t pose;
+    Rigid3d folded;
+    Vector6d folded_delta;
+  };
+  void step(UpdateSummary& summary);
+  void solve_step(UpdateSummary& summary, const std::vector<std::uint32_t>& terms);
+  void undo_step();
+  bool is_higher() const;
+  void hold_landmarks_back();
+  void raise_damping();
+  void relax_damping();
 
   LinearSystem rows_of_term(std::uint32_t term) const;
   void marginalize_poses(const std::vector<std::uint32_t>& poses);
@@ -188,6 +216,13 @@ class IncrementalSolver final : private TermSource {
   double rows_ = 0;
   double mismatch_ = 0;  // of all terms, squared
   double credit_ = 0;    // multiplications
+  // Of the step at hand.
+  std::uint64_t step_ = 0;
+  double rise_ = 0;                    // of the cost, twice
+  std::vector<std::uint32_t> judged_;  // terms that were evaluated
+  std::vector<Moved> moved_;
+  std::vector<std::uint32_t> held_back_;  // landmarks
+  std::vector<std::uint32_t> damped_;     // poses whose damping is not 0
 };
 
 }  // namespace hybrid_slam

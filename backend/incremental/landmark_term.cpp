@@ -41,8 +41,9 @@ void LandmarkTerm::assemble(Front& front) const {
     const LandmarkView& a = views[i];
     if (!a.usable || a.fixed) continue;
     const std::uint32_t slot_a = front.slot(a.pose);
-    front.add(slot_a, slot_a,
-              a.by_pose.transpose() * a.by_pose - a.reduced * a.reduced.transpose());
+    const Matrix6d own = a.by_pose.transpose() * a.by_pose;
+    front.add(slot_a, slot_a, own - a.reduced * a.reduced.transpose());
+    front.add_scale(slot_a, own.diagonal());
     front.add_gradient(slot_a, a.by_pose.transpose() * a.residual - a.reduced * half_solved);
     for (std::size_t j = 0; j < i; ++j) {
       const LandmarkView& b = views[j];

@@ -43,6 +43,8 @@ struct LandmarkTerm {
   Eigen::Matrix3d factor = Eigen::Matrix3d::Identity();   // L, with L L^T = sum by_point^T by_point
   Eigen::Vector3d half_solved = Eigen::Vector3d::Zero();  // L^-1 sum by_point^T residual
   bool solvable = false;                                  // the views determine the point
+  // What a judged step leaves out of the displacement, since with it the cost would be higher.
+  Eigen::Vector3d held_back = Eigen::Vector3d::Zero();
 
   // From the views' derivatives: factor, half_solved, reduced, solvable.
   void eliminate();

@@ -16,41 +16,31 @@ namespace {
 // Squared mismatch of an observation that does not project any more.
 constexpr double kFarOff = 1e6;
 
-// The square root of the weight that a loss gives a term.
-double robust_weight(Loss loss, double threshold, double squared) {
-  if (loss == Loss::kCauchy) return std::sqrt(1 / (1 + squared / threshold));
-  if (loss == Loss::kHuber && squared > threshold) return std::pow(threshold / squared, 0.25);
-  return 1;
-}
-
 // How often the step of a point is cut in half before it is given up.
 constexpr int kHalvings = 10;
 
 }  // namespace
 
 void IncrementalSolver::linearize(std::uint32_t term) {
-  const Term& t = terms_[term];
+  Term& t = terms_[term];
   if (t.kind == TermKind::kEdge) {
-    linearize_edge(t.index);
+    t.cost = linearize_edge(t.index);
   } else if (t.kind == TermKind::kLandmark) {
-    linearize_landmark(t.index);
+    t.cost = linearize_landmark(t.index);
   }
 }
 
-double IncrementalSolver::edge_weight(std::uint32_t index, const Vector6d& residual) const {
-  const Loss loss = edges_[index].loop ? options_.loop_loss : Loss::kNone;
-  return robust_weight(loss, options_.chi2_loop, residual.squaredNorm());
+RobustLoss IncrementalSolver::edge_loss(std::uint32_t index) const {
+  return {edges_[index].loop ? options_.loop_loss : Loss::kNone, options_.chi2_loop};
 }
 
-double IncrementalSolver::view_weight(const LandmarkView& view,
-                                      const Eigen::Vector3d& residual) const {
+RobustLoss IncrementalSolver::view_loss(const LandmarkView& view) const {
   const bool stereo = observation_factors_[view.observation]->num_residuals() == 3;
-  return robust_weight(options_.loss, stereo ? options_.chi2_stereo : options_.chi2_mono,
-                       residual.squaredNorm());
+  return {options_.loss, stereo ? options_.chi2_stereo : options_.chi2_mono};
 }
 
-void IncrementalSolver::linearize_edge(std::uint32_t index) {
-  if (edge_there_[index] == 0) return;
+double IncrementalSolver::linearize_edge(std::uint32_t index) {
+  if (edge_there_[index] == 0) return 0;
   const GraphEdge& edge = edges_[index];
   const Rigid3d a = pose(edge.a);
   const Rigid3d b = pose(edge.b);
@@ -60,7 +50,9 @@ void IncrementalSolver::linearize_edge(std::uint32_t index) {
   double* jacobians[] = {by_a, by_b};
   EdgeTerm& term = edge_terms_[index];
   edge_factors_[index]->Evaluate(blocks, term.residual.data(), jacobians);
-  const double weight = edge_weight(index, term.residual);
+  const RobustLoss loss = edge_loss(index);
+  const double squared = term.residual.squaredNorm();
+  const double weight = loss.root_weight(squared);
   term.residual *= weight;
   using RowMajor67 = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
   std::size_t k = 0;
@@ -72,9 +64,11 @@ void IncrementalSolver::linearize_edge(std::uint32_t index) {
     term.residual.noalias() -= term.by_pose[k] * at;
     ++k;
   }
+  return loss.cost(squared);
 }
 
-bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkView& view) const {
+bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkView& view,
+                                       double& cost) const {
   const ceres::CostFunction& factor = *observation_factors_[view.observation];
   const Rigid3d cam_from_world = pose(view.pose);
   const double* blocks[] = {cam_from_world.params.data(), point.data()};
@@ -85,7 +79,10 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
   view.residual.setZero();
   double* jacobians[] = {by_pose.data(), by_point.data()};
   if (!factor.Evaluate(blocks, view.residual.data(), jacobians)) return false;
-  const double weight = view_weight(view, view.residual);
+  const RobustLoss loss = view_loss(view);
+  const double squared = view.residual.squaredNorm();
+  cost += loss.cost(squared);
+  const double weight = loss.root_weight(squared);
   view.residual *= weight;
   view.by_point = weight * by_point;
   if (!view.fixed) {
@@ -96,16 +93,18 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
   return true;
 }
 
-void IncrementalSolver::linearize_landmark(std::uint32_t index) {
+double IncrementalSolver::linearize_landmark(std::uint32_t index) {
   LandmarkTerm& landmark = landmarks_[index];
   const Eigen::Vector3d start = carried_base(landmark);
   Eigen::Vector3d step = point(index) - start;
   if (!step.allFinite()) step.setZero();
   std::vector<LandmarkView> views = landmark.views;
+  double cost = 0;
   const auto linearize_at = [&](const Eigen::Vector3d& at) {
     bool all = true;
+    cost = 0;
     for (std::size_t i = 0; i < views.size(); ++i) {
-      views[i].usable = linearize_view(at, views[i]);
+      views[i].usable = linearize_view(at, views[i], cost);
       all = all && (views[i].usable || !landmark.views[i].usable);
     }
     return all;
@@ -121,6 +120,7 @@ void IncrementalSolver::linearize_landmark(std::uint32_t index) {
     linearize_at(start);
   }
   landmark.base = start + step;
+  landmark.held_back.setZero();
   landmark.views = std::move(views);
   landmark.anchor = LandmarkTerm::kNoAnchor;
   if (!landmark.poses.empty()) {
@@ -129,6 +129,7 @@ void IncrementalSolver::linearize_landmark(std::uint32_t index) {
     landmark.anchor_delta = tree_.delta(landmark.anchor);
   }
   landmark.eliminate();
+  return landmark.solvable ? cost : 0;
 }
 
 Vector6d IncrementalSolver::edge_residual(std::uint32_t index) const {
@@ -144,12 +145,14 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_edge(std::uint32_t ind
   if (edge_there_[index] == 0) return {};
   const EdgeTerm& term = edge_terms_[index];
   Vector6d residual = edge_residual(index);
-  residual *= edge_weight(index, residual);
+  const RobustLoss loss = edge_loss(index);
+  const double squared = residual.squaredNorm();
+  residual *= loss.root_weight(squared);
   Vector6d difference = residual - term.residual;
   for (std::size_t k = 0; k < term.variable; ++k) {
     difference.noalias() -= term.by_pose[k] * tree_.delta(term.poses[k]);
   }
-  return {residual.squaredNorm(), difference.squaredNorm(), 6};
+  return {residual.squaredNorm(), difference.squaredNorm(), loss.cost(squared), 6};
 }
 
 IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t index) const {
@@ -167,14 +170,30 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
     result.rows += factor.num_residuals();
     if (!factor.Evaluate(blocks, residual.data(), nullptr)) {
       result.squared_mismatch += kFarOff;
+      result.cost += kFarOff;
       continue;
     }
-    residual *= view_weight(view, residual);
+    const RobustLoss loss = view_loss(view);
+    const double squared = residual.squaredNorm();
+    result.cost += loss.cost(squared);
+    residual *= loss.root_weight(squared);
     result.squared_norm += residual.squaredNorm();
     residual -= view.residual + view.by_point * by_point;
     if (!view.fixed) residual.noalias() -= view.by_pose * tree_.delta(view.pose);
     result.squared_mismatch += residual.squaredNorm();
   }
+  return result;
+}
+
+IncrementalSolver::Evaluation IncrementalSolver::evaluate_prior(std::uint32_t index) const {
+  const PriorTerm& prior = priors_[index];
+  if (prior.poses.empty()) return {};
+  Eigen::VectorXd deltas(static_cast<Eigen::Index>(6 * prior.poses.size()));
+  for (std::size_t i = 0; i < prior.poses.size(); ++i) {
+    deltas.segment<6>(static_cast<Eigen::Index>(6 * i)) = tree_.delta(prior.poses[i]);
+  }
+  Evaluation result;  // never off its linearisation, and no measure of the others' residuals
+  result.cost = (prior.rows.residual + prior.rows.jacobian * deltas).squaredNorm();
   return result;
 }
 
@@ -215,9 +234,20 @@ double IncrementalSolver::cost() const {
 
 void IncrementalSolver::evaluate(std::uint32_t id) {
   Term& term = terms_[id];
-  if (term.kind == TermKind::kPrior) return;  // never off its linearisation
-  const Evaluation at =
-      term.kind == TermKind::kEdge ? evaluate_edge(term.index) : evaluate_landmark(term.index);
+  Evaluation at;
+  if (term.kind == TermKind::kEdge) at = evaluate_edge(term.index);
+  if (term.kind == TermKind::kLandmark) at = evaluate_landmark(term.index);
+  if (term.kind == TermKind::kPrior) at = evaluate_prior(term.index);
+  if (!std::isfinite(at.cost) || !std::isfinite(at.squared_mismatch)) {
+    at = {0, kFarOff, kFarOff, at.rows};
+  }
+  if (term.step != step_) {
+    term.step = step_;
+    term.start_cost = term.cost;
+    judged_.push_back(id);
+  }
+  rise_ += at.cost - term.cost;
+  term.cost = at.cost;
   squared_norm_ += at.squared_norm - term.squared_norm;
   rows_ += at.rows - term.rows;
   mismatch_ += at.squared_mismatch - term.mismatch;

@@ -15,6 +15,10 @@ namespace {
 
 constexpr std::uint32_t kOutside = std::numeric_limits<std::uint32_t>::max();
 
+// A pivot below this part of what terms added to its diagonal is rounding: some thousand
+// eliminations, one after another, each with the precision of a double.
+constexpr double kRankTolerance = 1e-12;
+
 void sort_unique(std::vector<std::uint32_t>& values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
@@ -35,6 +39,7 @@ void PoseTree::resize(std::size_t poses) {
   delta_.resize(poses, Vector6d::Zero());
   sent_.resize(poses, Vector6d::Zero());
   moved_.resize(poses, 0);
+  damping_.resize(poses, 0);
   local_.resize(poses, kOutside);
   slot_of_.resize(poses, 0);
 }
@@ -193,6 +198,7 @@ void PoseTree::refactor(const std::vector<std::uint32_t>& touched,
 
   last_cost_ = 0;
   last_poses_ = poses.size();
+  last_undetermined_ = 0;
   for (std::size_t i = made.size(); i-- > 0;) factor(made[i], own[i], terms);
 }
 
@@ -205,7 +211,60 @@ void PoseTree::add_contribution(const Clique& child, Front& front) const {
                 child.contribution.block<6, 6>(6 * i, 6 * j));
     }
     front.add_gradient(slot_j, child.contribution.row(6 * count).segment<6>(6 * j).transpose());
+    front.add_scale(slot_j, child.scale.segment<6>(6 * j));
   }
+}
+
+void PoseTree::damp(const Clique& clique, Front& front) const {
+  for (const std::uint32_t pose : clique.frontals) {
+    if (damping_[pose] == 0) continue;
+    const std::uint32_t slot = front.slot(pose);
+    const Vector6d weight = damping_[pose] * front.scale().segment<6>(6 * slot);
+    front.add(slot, slot, Matrix6d(weight.asDiagonal()));
+    front.add_gradient(slot, Vector6d(-weight.cwiseProduct(delta_[pose])));
+  }
+}
+
+// The Cholesky factor of the frontals' block, in place.
+void PoseTree::factor_frontals(Clique& clique, const Eigen::VectorXd& scale) {
+  const auto f = static_cast<Eigen::Index>(6 * clique.frontals.size());
+  auto block = clique.factor.topRows(f);
+  const Eigen::VectorXd diagonal = block.diagonal();
+  const Eigen::LLT<Eigen::MatrixXd> llt(block);
+  const auto pivots = llt.matrixLLT().diagonal().array().square();
+  const Eigen::VectorXd size = scale.cwiseMax(diagonal);
+  if (llt.info() == Eigen::Success && (pivots > kRankTolerance * size.array()).all()) {
+    block = llt.matrixL();
+    return;
+  }
+  ++singular_;
+  last_undetermined_ += factor_held(clique, size);
+}
+
+// The same, one column after the other: where a pivot is rounding, the direction's present delta
+// counts as measured. Returns how many were.
+std::size_t PoseTree::factor_held(Clique& clique, const Eigen::VectorXd& size) const {
+  const auto f = static_cast<Eigen::Index>(6 * clique.frontals.size());
+  auto block = clique.factor.topRows(f);
+  auto gradient = clique.factor.bottomRows<1>();
+  std::size_t held = 0;
+  for (Eigen::Index j = 0; j < f; ++j) {
+    const double unit = size[j] > 0 ? size[j] : 1;
+    if (!(block(j, j) > kRankTolerance * unit)) {
+      const double weight = options_.hold * unit;
+      block(j, j) = std::max(block(j, j), 0.0) + weight;
+      const std::uint32_t pose = clique.frontals[static_cast<std::size_t>(j / 6)];
+      gradient[j] -= weight * delta_[pose][j % 6];
+      ++held;
+    }
+    const Eigen::Index rest = f - j - 1;
+    block(j, j) = std::sqrt(block(j, j));
+    auto column = block.col(j).tail(rest);
+    column /= block(j, j);
+    block.bottomRightCorner(rest, rest).selfadjointView<Eigen::Lower>().rankUpdate(column, -1);
+    block.row(j).tail(rest).setZero();
+  }
+  return held;
 }
 
 void PoseTree::factor(std::int32_t index, const std::vector<std::uint32_t>& own,
@@ -217,28 +276,23 @@ void PoseTree::factor(std::int32_t index, const std::vector<std::uint32_t>& own,
   Front front(slot, slot_of_);
   for (const std::uint32_t term : own) terms.assemble(term, front);
   for (const std::int32_t child : clique.children) add_contribution(at(child), front);
+  damp(clique, front);
 
   const auto f = static_cast<Eigen::Index>(6 * clique.frontals.size());
   const auto s = static_cast<Eigen::Index>(6 * clique.separator.size());
   Eigen::MatrixXd& matrix = front.matrix();
   clique.factor = matrix.leftCols(f);
   clique.contribution = matrix.bottomRightCorner(s + 1, s);
-  Eigen::LLT<Eigen::MatrixXd> llt(clique.factor.topRows(f));
-  if (llt.info() != Eigen::Success) {
-    ++singular_;
-    const double scale = std::max(1.0, clique.factor.topRows(f).diagonal().maxCoeff());
-    for (double damping = options_.damping; llt.info() != Eigen::Success; damping *= 100) {
-      Eigen::MatrixXd damped = clique.factor.topRows(f);
-      damped.diagonal().array() += damping * scale;
-      llt.compute(damped);
-    }
-  }
-  if (!llt.matrixLLT().diagonal().allFinite() || !clique.factor.row(f + s).allFinite()) {
+  clique.scale = front.scale().tail(s);
+  factor_frontals(clique, front.scale().head(f));
+  if (!clique.factor.topRows(f).diagonal().allFinite() || !clique.factor.row(f + s).allFinite()) {
     throw std::logic_error("PoseTree: a term is not finite");
   }
-  clique.factor.topRows(f) = llt.matrixL();
   auto below = clique.factor.bottomRows(s + 1);
-  llt.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(below);
+  clique.factor.topRows(f)
+      .triangularView<Eigen::Lower>()
+      .transpose()
+      .solveInPlace<Eigen::OnTheRight>(below);
   if (s > 0) {
     const auto separator = clique.factor.middleRows(f, s);
     clique.contribution.topRows(s).selfadjointView<Eigen::Lower>().rankUpdate(separator, -1);
@@ -260,8 +314,11 @@ void PoseTree::solve_clique(Clique& clique, double threshold, std::vector<std::u
     right.noalias() -= clique.factor.middleRows(f, s).transpose() * separator;
   }
   clique.factor.topRows(f).triangularView<Eigen::Lower>().transpose().solveInPlace(right);
+  const bool finite = right.allFinite();
   for (std::size_t i = 0; i < clique.frontals.size(); ++i) {
     const std::uint32_t pose = clique.frontals[i];
+    if (!finite) right.segment<6>(static_cast<Eigen::Index>(6 * i)) = delta_[pose];
+    before_.push_back({pose, delta_[pose], sent_[pose]});
     delta_[pose] = right.segment<6>(static_cast<Eigen::Index>(6 * i));
     if ((delta_[pose] - sent_[pose]).lpNorm<Eigen::Infinity>() > threshold) {
       sent_[pose] = delta_[pose];
@@ -274,6 +331,8 @@ void PoseTree::solve_clique(Clique& clique, double threshold, std::vector<std::u
 
 void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
   const std::size_t first = changed.size();
+  before_.clear();
+  solved_.clear();
   std::vector<std::int32_t> stack;
   for (std::size_t i = 0; i < cliques_.size(); ++i) {
     if (!cliques_[i].frontals.empty() && cliques_[i].parent == kNone) {
@@ -281,15 +340,27 @@ void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
     }
   }
   while (!stack.empty()) {
-    Clique& clique = at(stack.back());
+    const std::int32_t index = stack.back();
+    Clique& clique = at(index);
     stack.pop_back();
     const bool moved = std::any_of(clique.separator.begin(), clique.separator.end(),
                                    [&](std::uint32_t pose) { return moved_[pose] != 0; });
     if (!clique.fresh && !moved) continue;
     solve_clique(clique, threshold, changed);
+    solved_.push_back(index);
     stack.insert(stack.end(), clique.children.begin(), clique.children.end());
   }
   for (std::size_t i = first; i < changed.size(); ++i) moved_[changed[i]] = 0;
+}
+
+void PoseTree::undo_solve() {
+  for (const Before& before : before_) {
+    delta_[before.pose] = before.delta;
+    sent_[before.pose] = before.sent;
+  }
+  for (const std::int32_t index : solved_) at(index).fresh = true;
+  before_.clear();
+  solved_.clear();
 }
 
 // Forward and back substitution with the pose's unit vectors, which concern its clique and those

@@ -18,7 +18,8 @@ class PoseTree {
  public:
   struct Options {
     std::size_t max_padding = 2;  // blocks of zeros in a clique, for fewer cliques
-    double damping = 1e-9;        // added to the diagonal of a clique that is singular
+    // How firmly a direction is held that no term determines: see refactor().
+    double hold = 1e-9;
   };
 
   explicit PoseTree(const Options& options) : options_(options) {}
@@ -34,13 +35,22 @@ class PoseTree {
   bool is_marked(std::span<const std::uint32_t> poses, const std::vector<char>& marked) const;
 
   // Factors anew: the terms on these poses changed, came or went. Poses in `newest` are eliminated
-  // last. A pose that has no term left leaves the system; its delta stays as it is.
+  // last. A pose that has no term left leaves the system; its delta stays as it is. A pivot that is
+  // nothing but rounding, measured by what its terms added before elimination, tells that a
+  // direction is not determined: it is held at its present delta.
   void refactor(const std::vector<std::uint32_t>& touched, const std::vector<std::uint32_t>& newest,
                 const TermSource& terms);
 
   // Substitutes back from the root down to where no delta changes by more than `threshold` any
   // more. Appends the poses whose delta changed by more than that to `changed`.
   void solve(double threshold, std::vector<std::uint32_t>& changed);
+
+  // Takes the last solve back: all deltas are what they were. The next one looks at them anew.
+  void undo_solve();
+
+  // Levenberg and Marquardt: from its next factorisation on, a pose's present delta counts as
+  // measured with `weight` times the information that its terms give it. 0: not.
+  void set_damping(std::uint32_t pose, double weight) { damping_[pose] = weight; }
 
   const Vector6d& delta(std::uint32_t pose) const { return delta_[pose]; }
 
@@ -51,6 +61,8 @@ class PoseTree {
   double last_cost() const { return last_cost_; }  // of the last refactor, in multiplications
   std::size_t last_poses() const { return last_poses_; }
   int singular_cliques() const { return singular_; }  // ever met
+  // Directions that no term determines, met in the last refactor.
+  std::size_t last_undetermined() const { return last_undetermined_; }
 
  private:
   static constexpr std::int32_t kNone = -1;
@@ -60,6 +72,7 @@ class PoseTree {
     std::vector<std::uint32_t> separator;
     Eigen::MatrixXd factor;        // (6 (f + s) + 1) x 6 f: [L11; L21; y^T]
     Eigen::MatrixXd contribution;  // (6 s + 1) x 6 s: what it hands to its parent
+    Eigen::VectorXd scale;         // 6 s: Front::add_scale of what it hands on
     std::int32_t parent = kNone;
     std::vector<std::int32_t> children;
     bool fresh = true;  // factored since it was last solved
@@ -79,6 +92,9 @@ class PoseTree {
                                           const TermSource& terms);
   void factor(std::int32_t index, const std::vector<std::uint32_t>& own, const TermSource& terms);
   void add_contribution(const Clique& child, Front& front) const;
+  void damp(const Clique& clique, Front& front) const;
+  void factor_frontals(Clique& clique, const Eigen::VectorXd& scale);
+  std::size_t factor_held(Clique& clique, const Eigen::VectorXd& scale) const;
   void solve_clique(Clique& clique, double threshold, std::vector<std::uint32_t>& changed);
 
   Options options_;
@@ -86,12 +102,21 @@ class PoseTree {
   std::vector<std::int32_t> free_;
   std::vector<std::int32_t> clique_of_;  // by pose
   std::vector<Vector6d> delta_;
-  std::vector<Vector6d> sent_;          // the delta that the cliques below were solved with
-  std::vector<char> moved_;             // in the solve that is going on
+  std::vector<Vector6d> sent_;  // the delta that the cliques below were solved with
+  std::vector<char> moved_;     // in the solve that is going on
+  std::vector<double> damping_;
+  struct Before {
+    std::uint32_t pose;
+    Vector6d delta;
+    Vector6d sent;
+  };
+  std::vector<Before> before_;          // of the poses of the last solve
+  std::vector<std::int32_t> solved_;    // cliques of the last solve
   std::vector<std::uint32_t> local_;    // scratch, by pose: index among the poses at hand
   std::vector<std::uint32_t> slot_of_;  // scratch, by pose: slot in the front at hand
   double last_cost_ = 0;
   std::size_t last_poses_ = 0;
+  std::size_t last_undetermined_ = 0;
   int singular_ = 0;
 };
 

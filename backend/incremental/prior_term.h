@@ -24,6 +24,7 @@ struct PriorTerm {
                   information.block<6, 6>(static_cast<Eigen::Index>(6 * i), column));
       }
       front.add_gradient(slot_j, gradient.segment<6>(column));
+      front.add_scale(slot_j, information.diagonal().segment<6>(column));
     }
   }
 };

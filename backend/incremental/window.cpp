@@ -126,6 +126,7 @@ void IncrementalSolver::add_prior(PriorTerm prior) {
     poses_[pose].terms.push_back(id);
     touched_.push_back(pose);
   }
+  terms_[id].cost = evaluate_prior(terms_[id].index).cost;
 }
 
 // The term's information has gone elsewhere. A landmark stays where it is, as if newly made.
@@ -138,7 +139,7 @@ void IncrementalSolver::drop_term(std::uint32_t id) {
   squared_norm_ -= term.squared_norm;
   rows_ -= term.rows;
   mismatch_ -= term.mismatch;
-  term.squared_norm = term.mismatch = 0;
+  term.squared_norm = term.mismatch = term.cost = 0;
   term.rows = 0;
   if (term.kind == TermKind::kEdge) {
     edge_there_[term.index] = 0;

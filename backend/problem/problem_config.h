@@ -6,13 +6,11 @@
 
 #include "backend/map/ids.h"
 #include "backend/map/map_edit.h"
+#include "backend/problem/loss.h"
 #include "cameras/camera.h"
 #include "cameras/geometry/sim3d.h"
 
 namespace hybrid_slam {
-
-// What tames terms beyond their threshold. kCauchy grows with the logarithm only: it lets go.
-enum class Loss { kNone, kHuber, kCauchy };
 
 // One run of the solver. Before the next round the observations are tested anew, and those beyond
 // their chi2 threshold set aside.
