@@ -22,8 +22,8 @@ constexpr int kAttempts = 8;
 // Mean squared residual below which measurements count as perfect.
 constexpr double kNoResidual = 1e-12;
 
-// The parts of its displacement that a landmark is tried with.
-constexpr double kParts[] = {0.5, 0.25, 0.125, 0};
+// How often a landmark's displacement is cut in half before it is left where it was.
+constexpr int kCuts = 10;
 
 }  // namespace
 
@@ -119,7 +119,8 @@ void IncrementalSolver::hold_landmarks_back() {
     const Eigen::Vector3d full = displacement(landmark);
     double best_cost = term.cost;
     Eigen::Vector3d best = Eigen::Vector3d::Zero();
-    for (const double part : kParts) {
+    for (int i = 1; i <= kCuts + 1; ++i) {
+      const double part = i <= kCuts ? std::ldexp(1.0, -i) : 0;
       landmark.held_back = (1 - part) * full;
       const double cost = evaluate_landmark(term.index).cost;
       if (!(cost < best_cost)) continue;
