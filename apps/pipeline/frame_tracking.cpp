@@ -16,13 +16,23 @@ std::int64_t next_frame_index(const MapSnapshot& map) {
   return next;
 }
 
+StereoTrackerOptions stereo_options(const FrameSource& source, const SlamOptions& options) {
+  StereoTrackerOptions stereo = options.tracking;
+  if (source.fisheye() != nullptr) {
+    stereo.keyframes.min_tracked_ratio =
+        std::max(stereo.keyframes.min_tracked_ratio, options.fisheye.stereo_tracked_ratio);
+  }
+  return stereo;
+}
+
 }  // namespace
 
 FrameTracking::FrameTracking(const FrameSource& source, const SlamOptions& options,
                              const RunOptions& run, LocalMapping& mapping, Recorder& recorder,
                              StageTimes& times)
     : places_(std::make_shared<KeyframeDatabase>(run.vocabulary)),
-      stereo_(mapping.camera_id(source.camera()), source.camera(), options.tracking, places_),
+      stereo_(mapping.camera_id(source.camera()), source.camera(), stereo_options(source, options),
+              places_),
       recorder_(recorder),
       times_(times),
       localize_(run.localize),

@@ -235,6 +235,7 @@ void fields_of(S section, FisheyeOptions& options) {
       .field("border", options.view.border)
       .field("mask", options.view.mask)
       .field("clahe", options.view.clahe)
+      .field("stereo_tracked_ratio", options.stereo_tracked_ratio)
       .refuse_unknown();
 }
 
@@ -338,6 +339,9 @@ void SlamOptions::distribute() {
 std::string SlamOptions::validate() const {
   if (features < 50 || features > 100000) {
     return "features must lie between 50 and 100000";
+  }
+  if (!(fisheye.stereo_tracked_ratio > 0 && fisheye.stereo_tracked_ratio <= 1)) {
+    return "fisheye: stereo_tracked_ratio must lie in (0, 1]";
   }
   for (const std::string& error :
        {sift.validate(), stereo.validate(), tracking.validate(), fisheye.view.validate(),

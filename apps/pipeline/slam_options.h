@@ -28,6 +28,9 @@ struct FisheyeOptions {
   bool upsample = true;  // as of SIFT; the rest of its options holds for all cameras
   FisheyeViewOptions view;
   FisheyeTrackerOptions tracking;
+  // The stereo pair's min_tracked_ratio where there is a fisheye, if that is more: the fisheye
+  // looks from other sides and is placed by what many stereo keyframes have seen.
+  double stereo_tracked_ratio = 0.75;
 };
 
 // Loop closing.

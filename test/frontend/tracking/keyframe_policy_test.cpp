@@ -30,8 +30,14 @@ TEST_CASE("When a frame becomes a keyframe") {
   };
   const Row rows[] = {
       {"nothing to gain", [](KeyframeEvidence&) {}, false},
-      {"share tracked just above 0.33", [](KeyframeEvidence& e) { e.inliers = 166; }, false},
-      {"share tracked just below 0.33", [](KeyframeEvidence& e) { e.inliers = 164; }, true},
+      {"share tracked just above 0.65", [](KeyframeEvidence& e) { e.inliers = 326; }, false},
+      {"share tracked just below 0.65", [](KeyframeEvidence& e) { e.inliers = 324; }, true},
+      {"a young map bears 0.4",
+       [](KeyframeEvidence& e) {
+         e.keyframes = 1;
+         e.inliers = 201;
+       },
+       false},
       {"overlap just above 0.85", [](KeyframeEvidence& e) { e.overlap = 0.851; }, false},
       {"overlap just below 0.85", [](KeyframeEvidence& e) { e.overlap = 0.849; }, true},
       {"new ground just below 0.15", [](KeyframeEvidence& e) { e.new_ground = 0.149; }, false},
