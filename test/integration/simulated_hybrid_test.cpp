@@ -78,7 +78,7 @@ TEST_CASE("A fisheye that moves by itself is placed in the stereo pair's map", "
   CHECK(errors.count == 60);
   CHECK(errors.translation < 0.003);
   CHECK(errors.rotation < 0.1 * std::numbers::pi / 180);
-  CHECK(count_keyframes(result, true) > 2);
+  CHECK(count_keyframes(result, true) >= 2);  // in 6 s: the first, and one 5 s later
 }
 
 TEST_CASE("The fisheye adds keyframes and landmarks and costs the stereo path nothing",
