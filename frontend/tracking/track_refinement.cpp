@@ -181,28 +181,36 @@ int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) const {
 }
 
 void TrackRefiner::learn_shading(const MapSnapshot& map, const Frame& frame) {
-  if (focal_ == 0 || frame.aligned.empty()) return;
-  const Eigen::Vector3d place = inverse(frame.cam_from_world).translation();
+  if (focal_ == 0 || !is_news(map, frame)) return;
+  learnt_at_ = inverse(frame.cam_from_world).translation();
   const auto& stereo = std::get<Calibrated<RectifiedStereo>>(camera_);
   std::vector<ShadedTrack> tracks;
-  std::vector<double> depths;
   for (const std::size_t i : frame.aligned) {
     const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
     Reference reference;
     if (landmark == nullptr || !find_reference(map, *landmark, reference)) continue;
     const Rigid3d& reference_from_world = reference.keyframe->cam_from_world;
-    depths.push_back((frame.cam_from_world * landmark->point_in_world).z());
     tracks.push_back(make_shaded_track(stereo, frame.cam_from_world * inverse(reference_from_world),
                                        *reference.keypoint, reference.u_right,
                                        frame.features.left.keypoints[i],
                                        (reference_from_world * landmark->point_in_world).z()));
   }
-  if (depths.empty()) return;
+  shading_.add(tracks, shading());
+}
+
+// Whether the frame has aligned tracks, and stands far enough from the last one that was looked at.
+bool TrackRefiner::is_news(const MapSnapshot& map, const Frame& frame) const {
+  std::vector<double> depths;
+  for (const std::size_t i : frame.aligned) {
+    const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
+    if (landmark == nullptr) continue;
+    depths.push_back((frame.cam_from_world * landmark->point_in_world).z());
+  }
+  if (depths.empty()) return false;
   const auto middle = depths.begin() + static_cast<long>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
-  if (learnt_at_ && (place - *learnt_at_).norm() < kLearningStep * *middle) return;
-  learnt_at_ = place;
-  shading_.add(tracks, shading());
+  const Eigen::Vector3d place = inverse(frame.cam_from_world).translation();
+  return !learnt_at_ || (place - *learnt_at_).norm() >= kLearningStep * *middle;
 }
 
 }  // namespace hybrid_slam

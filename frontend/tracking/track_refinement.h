@@ -57,6 +57,7 @@ class TrackRefiner {
   struct Reference;
 
   const ImagePyramid* image_of(std::int64_t frame_index) const;
+  bool is_news(const MapSnapshot& map, const Frame& frame) const;
   bool find_reference(const MapSnapshot& map, const Landmark& landmark, Reference& reference) const;
   bool refine_keypoint(const MapSnapshot& map, const Landmark& landmark, std::size_t index,
                        Frame& frame) const;
