@@ -10,8 +10,9 @@ namespace hybrid_slam {
 // Every factor of ours writes its Jacobian by such a block in the tangent space already, padded
 // with zeros to the block's size: [J6 | 0] for a pose. The plus-Jacobian is the matching lift
 // [I; 0], so that their product is J6 itself, and not the derivative of Plus in the quaternion's
-// coordinates. Hence the rule: a block with one of these manifolds meets factors of ours only;
-// a ceres::AutoDiffCostFunction by the quaternion's coordinates would be wrong with it.
+// coordinates. Hence the rule: a block with one of these manifolds meets such factors only; a
+// ceres::AutoDiffCostFunction by the quaternion's coordinates would be wrong with it, and is taken
+// through left_jacobian() first (left_jacobian.h).
 
 // 7 doubles as in Rigid3d; delta = (translation, rotation).
 class PoseManifold final : public ceres::Manifold {

@@ -3,6 +3,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include "cameras/geometry/rigid3d.h"
+#include "factors/left_jacobian.h"
 
 namespace hybrid_slam {
 
@@ -12,7 +13,7 @@ namespace hybrid_slam {
 // information: 6x6, translation first, in frame b. Whitened by L^T and not by L, which would
 // minimise another chi2 as soon as the information is not isotropic. The scalar part of E's
 // quaternion is taken as non-negative: of the two turns, the shorter one.
-class RelativePoseFactor final : public ceres::SizedCostFunction<6, 7, 7> {
+class RelativePoseFactor final : public ceres::SizedCostFunction<6, 7, 7>, public LeftJacobian {
  public:
   // Throws std::logic_error unless the information is symmetric and positive definite.
   RelativePoseFactor(const Rigid3d& measured_a_from_b, const Matrix6d& information);

@@ -7,6 +7,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include "cameras/geometry/rigid3d.h"
+#include "factors/left_jacobian.h"
 #include "factors/reprojection.h"
 
 namespace hybrid_slam {
@@ -25,9 +26,10 @@ enum class Intrinsics { kFixed, kRefined };
 // fails.
 template <ProjectionModel M, Intrinsics kIntrinsics = Intrinsics::kFixed>
 class ReprojectionFactor final
-    : public std::conditional_t<
-          kIntrinsics == Intrinsics::kFixed, ceres::SizedCostFunction<M::kMeasurementDim, 7, 3>,
-          ceres::SizedCostFunction<M::kMeasurementDim, 7, 3, M::kParamCount>> {
+    : public std::conditional_t<kIntrinsics == Intrinsics::kFixed,
+                                ceres::SizedCostFunction<M::kMeasurementDim, 7, 3>,
+                                ceres::SizedCostFunction<M::kMeasurementDim, 7, 3, M::kParamCount>>,
+      public LeftJacobian {
  public:
   using Params = std::array<double, M::kParamCount>;
 

@@ -14,8 +14,8 @@ namespace {
 std::vector<std::uint32_t> time_order(const std::vector<char>& last) {
   std::vector<std::uint32_t> order(last.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::stable_partition(order.begin(), order.end(),
-                        [&](std::uint32_t vertex) { return last[vertex] == 0; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return last[a] < last[b]; });
   return order;
 }
 
@@ -31,6 +31,14 @@ std::vector<std::uint32_t> minimum_degree_order(
   }
   if (rows.empty()) return time_order(last);
   std::vector<int> constraints(last.begin(), last.end());
+  // CAMD wants groups below the number of vertices: without a gap they are.
+  if (std::find(last.begin(), last.end(), 1) == last.end()) {
+    for (int& group : constraints) group /= 2;
+  }
+  if (std::find(last.begin(), last.end(), 0) == last.end() &&
+      std::find(last.begin(), last.end(), 2) != last.end()) {
+    for (int& group : constraints) group = std::max(group - 1, 0);
+  }
   std::vector<int> permutation(adjacency.size());
   double control[CAMD_CONTROL];
   camd_defaults(control);
@@ -74,12 +82,20 @@ std::vector<std::vector<std::uint32_t>> structures(
 // additions touch was mostly added recently, and stays near the root.
 constexpr double kPatience = 2;
 
-// Multiplications of the elimination, in blocks.
-double cost_of(const std::vector<std::vector<std::uint32_t>>& rows) {
+// Multiplications of the elimination of vertices of these sizes, or of one row each.
+double cost_of(const std::vector<std::vector<std::uint32_t>>& rows,
+               const std::vector<std::uint32_t>& vertex, const std::vector<std::uint32_t>& sizes) {
   double cost = 0;
-  for (const auto& row : rows) {
-    const auto n = static_cast<double>(row.size() + 1);
-    cost += n * n;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (sizes.empty()) {
+      const auto n = static_cast<double>(rows[k].size() + 1);
+      cost += n * n;
+      continue;
+    }
+    const double own = sizes[vertex[k]];
+    double n = own;
+    for (const std::uint32_t row : rows[k]) n += sizes[vertex[row]];
+    cost += own * n * n;
   }
   return cost;
 }
@@ -87,12 +103,13 @@ double cost_of(const std::vector<std::vector<std::uint32_t>>& rows) {
 }  // namespace
 
 std::vector<EliminationClique> eliminate(const std::vector<std::vector<std::uint32_t>>& adjacency,
-                                         const std::vector<char>& last, std::size_t max_padding) {
+                                         const std::vector<char>& last, std::size_t max_padding,
+                                         const std::vector<std::uint32_t>& sizes) {
   std::vector<std::uint32_t> vertex = minimum_degree_order(adjacency, last);
   auto rows = structures(adjacency, vertex);
   std::vector<std::uint32_t> in_time = time_order(last);
   auto rows_in_time = structures(adjacency, in_time);
-  if (cost_of(rows_in_time) <= kPatience * cost_of(rows)) {
+  if (cost_of(rows_in_time, in_time, sizes) <= kPatience * cost_of(rows, vertex, sizes)) {
     vertex = std::move(in_time);
     rows = std::move(rows_in_time);
   }

@@ -13,10 +13,11 @@ struct EliminationClique {
 };
 
 // Orders the vertices of a symmetric graph (adjacency lists, ascending, without the vertex itself)
-// by constrained approximate minimum degree, those with last[v] != 0 at the end, and gathers them
-// in cliques. A vertex joins its parent's clique if that costs at most `max_padding` blocks of
-// zeros.
+// by constrained approximate minimum degree, those with last[v] = 1 at the end and those with 2
+// behind them, and gathers them in cliques. A vertex joins its parent's clique if that costs at
+// most `max_padding` blocks of zeros. `sizes`: rows per vertex; empty: all alike.
 std::vector<EliminationClique> eliminate(const std::vector<std::vector<std::uint32_t>>& adjacency,
-                                         const std::vector<char>& last, std::size_t max_padding);
+                                         const std::vector<char>& last, std::size_t max_padding,
+                                         const std::vector<std::uint32_t>& sizes = {});
 
 }  // namespace hybrid_slam

@@ -28,11 +28,6 @@ void refuse(const char* fault, const char* what) {
   throw std::logic_error("IncrementalSolver: " + std::string(what) + ": " + fault);
 }
 
-bool sees(const LandmarkTerm& landmark, std::uint32_t pose) {
-  return std::any_of(landmark.views.begin(), landmark.views.end(),
-                     [&](const LandmarkView& view) { return view.pose == pose; });
-}
-
 void erase_value(std::vector<std::uint32_t>& values, std::uint32_t value) {
   values.erase(std::remove(values.begin(), values.end(), value), values.end());
 }
@@ -51,11 +46,38 @@ std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
   pose.tangent.place = inverse(frame.cam_from_world).translation();
   pose.folded = frame.cam_from_world;
   pose.camera = frame.camera;
-  pose.fixed = frame.fixed;
+  pose.variable = add_variable(false, index, frame.fixed);
   poses_.push_back(std::move(pose));
-  tree_.resize(poses_.size());
-  if (!frame.fixed) newest_.push_back(index);
+  tree_.resize(variables_.size());
+  if (!frame.fixed) newest_.push_back(poses_[index].variable);
   return index;
+}
+
+std::uint32_t IncrementalSolver::add_variable(bool is_block, std::uint32_t index, bool fixed) {
+  Variable variable;
+  variable.is_block = is_block;
+  variable.index = index;
+  variable.fixed = fixed;
+  variables_.push_back(std::move(variable));
+  return static_cast<std::uint32_t>(variables_.size()) - 1;
+}
+
+// Notes with a variable that a term has it; the term's own variables are up to date.
+void IncrementalSolver::link(std::uint32_t index, std::uint32_t term) {
+  Variable& variable = variables_[index];
+  if (variable.gone) return;
+  const auto others = poses_of(term);
+  const bool mixed = variable.shared &&
+                     std::any_of(others.begin(), others.end(),
+                                 [this](std::uint32_t other) { return !variables_[other].shared; });
+  (variable.fixed ? variable.dormant : mixed ? variable.mixed : variable.terms).push_back(term);
+}
+
+void IncrementalSolver::unlink(std::uint32_t index, std::uint32_t term) {
+  Variable& variable = variables_[index];
+  erase_value(variable.terms, term);
+  if (variable.shared) erase_value(variable.mixed, term);
+  if (variable.fixed || !variable.dormant.empty()) erase_value(variable.dormant, term);
 }
 
 std::uint32_t IncrementalSolver::add_point(const Eigen::Vector3d& in_world) {
@@ -97,13 +119,13 @@ std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observa
       make_reprojection_factor(camera, observation.measurement, observation.sigma);
   LandmarkView view;
   view.observation = index;
-  view.pose = observation.frame;
-  view.fixed = pose.fixed;
-  const bool is_first = !sees(landmark, observation.frame);
+  view.pose = pose.variable;
+  view.fixed = variables_[pose.variable].fixed;
+  const bool is_first = !uses(landmark, pose.variable);
   landmark.views.push_back(view);
-  if (!pose.fixed && is_first) {
-    landmark.poses.push_back(observation.frame);
-    pose.terms.push_back(landmark_terms_[observation.point]);
+  if (is_first) {
+    if (!view.fixed) landmark.poses.push_back(pose.variable);
+    link(pose.variable, landmark_terms_[observation.point]);
   }
   mark_dirty(landmark_terms_[observation.point]);
   return index;
@@ -131,12 +153,13 @@ std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
   edge_factors_.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
   EdgeTerm term;
   for (const std::uint32_t pose : {edge.a, edge.b}) {
-    if (!poses_[pose].fixed) term.poses[term.variable++] = pose;
+    const std::uint32_t variable = poses_[pose].variable;
+    if (!variables_[variable].fixed) term.poses[term.variable++] = variable;
   }
   edge_terms_.push_back(term);
   const std::uint32_t id = add_term(TermKind::kEdge, index);
   edge_ids_.push_back(id);
-  for (const std::uint32_t pose : poses_of(id)) poses_[pose].terms.push_back(id);
+  for (const std::uint32_t pose : {edge.a, edge.b}) link(poses_[pose].variable, id);
   mark_dirty(id);
   return index;
 }
@@ -152,11 +175,11 @@ void IncrementalSolver::remove_observation(std::uint32_t observation) {
   free_observations_.push_back(observation);
   std::erase_if(landmark.views,
                 [&](const LandmarkView& view) { return view.observation == observation; });
-  if (!poses_[removed.frame].fixed && !sees(landmark, removed.frame)) {
-    touched_.push_back(removed.frame);
-    erase_value(landmark.poses, removed.frame);
-    erase_value(poses_[removed.frame].terms, term);
-  }
+  const std::uint32_t variable = poses_[removed.frame].variable;
+  if (uses(landmark, variable)) return;
+  touched_.push_back(variable);
+  erase_value(landmark.poses, variable);
+  unlink(variable, term);
 }
 
 void IncrementalSolver::remove_point(std::uint32_t point) {
@@ -164,6 +187,7 @@ void IncrementalSolver::remove_point(std::uint32_t point) {
   if (point_there_[point] == 0) return;
   point_there_[point] = 0;
   while (!landmark.views.empty()) remove_observation(landmark.views.back().observation);
+  while (!landmark.factors.empty()) remove_factor(landmark.factors.back().factor);
   free_points_.push_back(point);
 }
 
@@ -171,10 +195,9 @@ void IncrementalSolver::remove_edge(std::uint32_t edge) {
   if (item(edge_there_, edge, "edge") == 0) return;
   edge_there_[edge] = 0;
   mark_dirty(edge_ids_[edge]);
-  for (std::size_t i = 0; i < edge_terms_[edge].variable; ++i) {
-    const std::uint32_t pose = edge_terms_[edge].poses[i];
-    touched_.push_back(pose);
-    erase_value(poses_[pose].terms, edge_ids_[edge]);
+  for (const std::uint32_t pose : {edges_[edge].a, edges_[edge].b}) {
+    touched_.push_back(poses_[pose].variable);
+    unlink(poses_[pose].variable, edge_ids_[edge]);
   }
   edge_terms_[edge].variable = 0;
 }

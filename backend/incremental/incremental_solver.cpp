@@ -29,6 +29,7 @@ std::string IncrementalOptions::validate() const {
   if (window < 0) return "window must not be negative";
   if (!(burst >= 1)) return "burst must be at least 1";
   if (!(wildfire >= 0)) return "wildfire must not be negative";
+  if (!(block_wildfire >= 0)) return "block_wildfire must not be negative";
   if (max_steps < 1) return "max_steps must be positive";
   if (!(budget >= 0)) return "budget must not be negative";
   if (!(chi2_mono > 0) || !(chi2_stereo > 0) || !(chi2_loop > 0))
@@ -37,7 +38,11 @@ std::string IncrementalOptions::validate() const {
 }
 
 IncrementalSolver::IncrementalSolver(const IncrementalOptions& options)
-    : options_(options), tree_(PoseTree::Options{}) {
+    : options_(options), tree_([&] {
+        PoseTree::Options tree;
+        tree.share = options.block_wildfire;
+        return tree;
+      }()) {
   if (const std::string wrong = options.validate(); !wrong.empty()) {
     throw std::invalid_argument("IncrementalOptions: " + wrong);
   }
@@ -45,28 +50,40 @@ IncrementalSolver::IncrementalSolver(const IncrementalOptions& options)
 
 IncrementalSolver::~IncrementalSolver() = default;
 
-std::span<const std::uint32_t> IncrementalSolver::terms_of(std::uint32_t pose) const {
-  return poses_[pose].terms;
+std::span<const std::uint32_t> IncrementalSolver::terms_of(std::uint32_t variable) const {
+  return variables_[variable].terms;
+}
+
+bool IncrementalSolver::has_terms(std::uint32_t variable) const {
+  return !variables_[variable].terms.empty() || !variables_[variable].mixed.empty();
 }
 
 std::span<const std::uint32_t> IncrementalSolver::poses_of(std::uint32_t term) const {
   const Term& t = terms_[term];
-  if (t.kind == TermKind::kEdge) {
-    const EdgeTerm& edge = edge_terms_[t.index];
-    return {edge.poses, edge.variable};
+  switch (t.kind) {
+    case TermKind::kEdge:
+      return {edge_terms_[t.index].poses, edge_terms_[t.index].variable};
+    case TermKind::kPrior:
+      return priors_[t.index].active.variables;
+    case TermKind::kFactor:
+      return factor_terms_[t.index].variables;
+    case TermKind::kLandmark:
+      break;
   }
-  if (t.kind == TermKind::kPrior) return priors_[t.index].poses;
   return landmarks_[t.index].poses;
 }
 
 void IncrementalSolver::assemble(std::uint32_t term, Front& front) const {
   const Term& t = terms_[term];
-  if (t.kind == TermKind::kEdge) {
-    edge_terms_[t.index].assemble(front);
-  } else if (t.kind == TermKind::kPrior) {
-    priors_[t.index].assemble(front);
-  } else {
-    landmarks_[t.index].assemble(front);
+  switch (t.kind) {
+    case TermKind::kEdge:
+      return edge_terms_[t.index].assemble(front);
+    case TermKind::kPrior:
+      return priors_[t.index].active.assemble(front);
+    case TermKind::kFactor:
+      return factor_terms_[t.index].assemble(front);
+    case TermKind::kLandmark:
+      return landmarks_[t.index].assemble(front);
   }
 }
 
@@ -76,21 +93,27 @@ void IncrementalSolver::mark_dirty(std::uint32_t term) {
   dirty_.push_back(term);
 }
 
-Vector6d IncrementalSolver::delta(std::uint32_t pose) const {
-  return poses_[pose].fixed ? Vector6d::Zero() : tree_.delta(pose);
-}
-
-Matrix6d IncrementalSolver::covariance(std::uint32_t pose) const {
-  if (poses_.at(pose).fixed) return Matrix6d::Zero();
-  // The left perturbation that an increment is.
-  const Matrix6d left = poses_[pose].tangent.from_left(Matrix6d::Identity(), this->pose(pose));
-  return left * tree_.covariance(pose) * left.transpose();
-}
-
 Rigid3d IncrementalSolver::pose(std::uint32_t index) const {
-  const Pose& pose = poses_.at(index);
-  if (pose.fixed || tree_.delta(index) == pose.folded_delta) return pose.folded;
-  return pose.tangent.moved(pose.folded, tree_.delta(index) - pose.folded_delta);
+  return pose_at(poses_.at(index).variable);
+}
+
+Rigid3d IncrementalSolver::pose_at(std::uint32_t variable) const {
+  const Pose& pose = pose_with(variable);
+  const auto delta = tree_.delta(variable);
+  if (variables_[variable].fixed || delta == pose.folded_delta) return pose.folded;
+  return pose.tangent.moved(pose.folded, delta - pose.folded_delta);
+}
+
+Eigen::Matrix3d IncrementalSolver::carrier_rotation(const Block& block) const {
+  if (block.given.world_vectors.empty()) return Eigen::Matrix3d::Identity();
+  return pose_at(block.carrier).rotation().toRotationMatrix();
+}
+
+Eigen::VectorXd IncrementalSolver::block(std::uint32_t index) const {
+  const Block& block = blocks_.at(index);
+  if (!block.there) throw std::logic_error("IncrementalSolver::block: was removed");
+  if (variables_[block.variable].fixed) return block.given.values;
+  return block.in_world(block.inner_at(tree_.delta_of(block.variable)), carrier_rotation(block));
 }
 
 Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
@@ -99,28 +122,35 @@ Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
   if (!landmark.solvable) return at;
   at += displacement(landmark);
   if (landmark.anchor != LandmarkTerm::kNoAnchor) {
-    at -= poses_[landmark.anchor].tangent.carried(
-        landmark.base, tree_.delta(landmark.anchor) - landmark.anchor_delta);
+    at -= pose_with(landmark.anchor)
+              .tangent.carried(landmark.base, tree_.delta(landmark.anchor) - landmark.anchor_delta);
   }
   return at;
 }
 
 Eigen::Vector3d IncrementalSolver::displacement(const LandmarkTerm& landmark) const {
-  return landmark.displacement([this](std::uint32_t pose) { return tree_.delta(pose); }) -
+  return landmark.displacement(
+             [this](std::uint32_t pose) { return tree_.delta(pose); },
+             [this](std::uint32_t variable) { return tree_.delta_of(variable); }) -
          landmark.held_back;
 }
 
 // Where its anchor's motion, in full, took the point since it was linearised.
 Eigen::Vector3d IncrementalSolver::carried_base(const LandmarkTerm& landmark) const {
   if (landmark.anchor == LandmarkTerm::kNoAnchor) return landmark.base;
-  return inverse(pose(landmark.anchor)) * landmark.in_anchor;
+  return inverse(pose_at(landmark.anchor)) * landmark.in_anchor;
 }
 
-// Makes the pose's increments since the last time part of its estimate. Increments are composed one
-// by one, since only so poses that share them stay rigid.
-void IncrementalSolver::fold(std::uint32_t index) {
-  poses_[index].folded = pose(index);
-  poses_[index].folded_delta = tree_.delta(index);
+// Makes the variable's increments since the last time part of its estimate. Increments are composed
+// one by one, since only so poses that share them stay rigid.
+void IncrementalSolver::fold(std::uint32_t variable) {
+  if (variables_[variable].is_block) {
+    blocks_[variables_[variable].index].fold(tree_.delta_of(variable));
+    return;
+  }
+  Pose& pose = pose_with(variable);
+  pose.folded = pose_at(variable);
+  pose.folded_delta = tree_.delta(variable);
 }
 
 // Measures anew how far these terms and those of these poses are from their linearisation.
@@ -138,8 +168,9 @@ void IncrementalSolver::check(const std::vector<std::uint32_t>& linearized,
     }
   };
   for (const std::uint32_t id : linearized) check_term(id);
-  for (const std::uint32_t pose : moved) {
-    for (const std::uint32_t id : poses_[pose].terms) check_term(id);
+  for (const std::uint32_t variable : moved) {
+    for (const std::uint32_t id : variables_[variable].terms) check_term(id);
+    for (const std::uint32_t id : variables_[variable].mixed) check_term(id);
   }
   const double negligible = kNegligible * options_.relinearization * typical();
   std::erase_if(pending_, [&](std::uint32_t id) {
@@ -213,42 +244,16 @@ UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
     step(summary);
     if (i + 1 < options_.max_steps) summary.relinearized += choose();
   }
-  std::sort(summary.moved.begin(), summary.moved.end());
-  summary.moved.erase(std::unique(summary.moved.begin(), summary.moved.end()), summary.moved.end());
+  for (std::vector<std::uint32_t>* moved : {&summary.moved, &summary.moved_blocks}) {
+    std::sort(moved->begin(), moved->end());
+    moved->erase(std::unique(moved->begin(), moved->end()), moved->end());
+  }
   if (!summary.stopped) {
     newest_.clear();
     summary.marginalized = slide_window();
   }
   summary.pending = pending_.size();
   return summary;
-}
-
-FactorGraph IncrementalSolver::graph() const {
-  FactorGraph graph;
-  for (const Camera& camera : cameras_) graph.cameras.push_back({camera, 0});
-  for (std::uint32_t i = 0; i < poses_.size(); ++i) {
-    graph.frames.push_back({pose(i), poses_[i].camera, poses_[i].fixed});
-  }
-  for (std::uint32_t i = 0; i < landmarks_.size(); ++i) graph.points.push_back({point(i), false});
-  for (std::size_t i = 0; i < observations_.size(); ++i) {
-    if (observation_there_[i] != 0) graph.observations.push_back(observations_[i]);
-  }
-  for (std::size_t i = 0; i < edges_.size(); ++i) {
-    if (edge_there_[i] != 0) graph.edges.push_back(edges_[i]);
-  }
-  for (const PriorTerm& prior : priors_) {
-    if (prior.poses.empty()) continue;
-    GraphPrior made{prior.poses, {}, prior.rows.jacobian, prior.rows.residual};
-    for (std::size_t k = 0; k < prior.poses.size(); ++k) {
-      const std::uint32_t i = prior.poses[k];
-      auto by_pose = made.jacobian.middleCols<6>(static_cast<Eigen::Index>(6 * k));
-      made.bases.push_back(pose(i));
-      made.residual += by_pose * delta(i);
-      by_pose = poses_[i].tangent.to_origin(by_pose);
-    }
-    graph.priors.push_back(std::move(made));
-  }
-  return graph;
 }
 
 }  // namespace hybrid_slam

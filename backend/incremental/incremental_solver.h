@@ -4,11 +4,12 @@
 #include <stop_token>
 #include <vector>
 
+#include "backend/incremental/block.h"
 #include "backend/incremental/edge_term.h"
 #include "backend/incremental/landmark_term.h"
 #include "backend/incremental/pose_tree.h"
-#include "backend/incremental/prior_term.h"
 #include "backend/incremental/robust_loss.h"
+#include "backend/incremental/rows_term.h"
 #include "backend/incremental/world_tangent.h"
 #include "backend/problem/factor_graph.h"
 #include "backend/problem/problem_config.h"
@@ -28,6 +29,10 @@ struct IncrementalOptions {
   double worst_mismatch = 0.5;
   // Back-substitution stops where a pose moves by less (metres, radians).
   double wildfire = 1e-5;
+  // The same of other variables, in their standard deviations: a calibration that all terms share
+  // moves a little with every update, and so seldom reaches them all. What is left out of the cost
+  // is half the square of this.
+  double block_wildfire = 0.1;
   int max_steps = 3;  // Gauss-Newton steps per update
   // Multiplications that relinearising old terms may cost per update, on average; what was not
   // spent is saved up for later ones, up to `burst` times as much. The rest waits its turn.
@@ -57,6 +62,7 @@ struct UpdateSummary {
   std::size_t relinearized = 0;      // terms
   std::size_t pending = 0;           // terms that wait to be linearised anew
   std::vector<std::uint32_t> moved;  // poses whose estimate changed, ascending
+  std::vector<std::uint32_t> moved_blocks;  // likewise
   std::vector<std::uint32_t> marginalized;  // poses that no longer move, from now on; ascending
   double multiplications = 0;               // of the factorisation
 };
@@ -81,11 +87,32 @@ class IncrementalSolver final : private TermSource {
   std::uint32_t add_edge(const GraphEdge& edge);
   void remove_observation(std::uint32_t observation);
   void remove_edge(std::uint32_t edge);
-  void remove_point(std::uint32_t point);  // with its observations
+  void remove_point(std::uint32_t point);  // with its observations and factors
+
+  // Variables and factors of any kind (backend/problem/graph_factor.h), by the same rules; indices
+  // of what was removed are used again. A factor's residuals must be numbers at the present
+  // estimate, or its function fail there: then it waits until it does not.
+  std::uint32_t add_block(const GraphBlock& block);
+  std::uint32_t add_factor(const GraphFactor& factor);
+  void remove_factor(std::uint32_t factor);
+  void remove_block(std::uint32_t block);  // with its factors
+
+  // Whether a pose or a block varies, from the next update on. One that rides with a pose is fixed
+  // in the world. What was marginalised stays fixed.
+  void set_fixed(const GraphVariable& variable, bool fixed);
+
+  // Poses and blocks leave the system: what their terms say about others stays, as a linear prior.
+  // Landmarks of these poses are minimised out as well, and blocks that ride with them go, too.
+  void marginalize(const std::vector<GraphVariable>& variables);
 
   // The covariance of a pose's left perturbation, exp(d) * cam_from_world, given all that was taken
   // in; conditional on what is fixed.
   Matrix6d covariance(std::uint32_t pose) const;
+  // The same of several variables together, in this order: 6 rows of a pose, 3 of a point, and as
+  // many as it has values of a block, which on a manifold makes it singular. Zero of what does not
+  // vary, NaN of a point that its views do not determine. The cost is that of the tree's way from
+  // these variables to the root, of a point from all that see it.
+  Eigen::MatrixXd covariance(const std::vector<GraphVariable>& variables) const;
 
   // Takes in what was added and removed since the last update. Looks at `stop` between steps; what
   // was left to do then waits for the next update.
@@ -93,6 +120,7 @@ class IncrementalSolver final : private TermSource {
 
   Rigid3d pose(std::uint32_t index) const;
   Eigen::Vector3d point(std::uint32_t index) const;
+  Eigen::VectorXd block(std::uint32_t index) const;
   std::size_t pose_count() const { return poses_.size(); }
 
   // Squared whitened residual of an observation that is there, at the present estimate; infinite if
@@ -102,12 +130,12 @@ class IncrementalSolver final : private TermSource {
   // The terms that are there, at the present estimate: for a batch solver.
   FactorGraph graph() const;
 
-  // Half the sum of squares, without a loss, of all observations that project and of all edges at
-  // the present estimate. Evaluates each.
+  // Half the sum of squares, without a loss, of all observations that project, of all edges and of
+  // all factors at the present estimate. Evaluates each.
   double cost() const;
 
  private:
-  enum class TermKind : std::uint8_t { kEdge, kLandmark, kPrior };
+  enum class TermKind : std::uint8_t { kEdge, kLandmark, kPrior, kFactor };
 
   struct Term {
     TermKind kind = TermKind::kEdge;
@@ -123,22 +151,66 @@ class IncrementalSolver final : private TermSource {
     std::uint64_t step = 0;     // in which it was evaluated last
   };
 
+  // What the tree solves for: a pose or a block. Terms know their variables by the number of these.
+  struct Variable {
+    bool is_block = false;
+    std::uint32_t index = 0;  // of the pose or block
+    bool fixed = false;
+    bool gone = false;    // marginalised or removed
+    bool shared = false;  // eliminated after all others
+    double damping = 0;   // see PoseTree::set_damping
+    std::vector<std::uint32_t> terms;
+    std::vector<std::uint32_t> mixed;    // of a shared one: its terms that have others, too
+    std::vector<std::uint32_t> dormant;  // of a fixed one: all its terms
+  };
+
   struct Pose {
+    std::uint32_t variable = 0;
     WorldTangent tangent;
     Rigid3d folded;  // the estimate when its delta was folded_delta
     Vector6d folded_delta = Vector6d::Zero();
     std::uint32_t camera = GraphFrame::kNoCamera;
-    bool fixed = false;
-    double damping = 0;  // see PoseTree::set_damping
-    std::vector<std::uint32_t> terms;
   };
 
-  std::span<const std::uint32_t> terms_of(std::uint32_t pose) const override;
+  struct Factor {
+    GraphFactor given;
+    std::shared_ptr<const ceres::CostFunction> function;  // with left Jacobians
+    bool there = false;
+    std::uint32_t point = kNone;
+    std::uint32_t term = kNone;
+  };
+
+  // What marginalised variables left on others; `active` is what is left of it once those that were
+  // fixed since are put in.
+  struct Prior {
+    RowsTerm all;
+    RowsTerm active;
+  };
+
+  static constexpr std::uint32_t kNone = GraphBlock::kNone;
+
+  std::span<const std::uint32_t> terms_of(std::uint32_t variable) const override;
+  bool has_terms(std::uint32_t variable) const override;
   std::span<const std::uint32_t> poses_of(std::uint32_t term) const override;
   void assemble(std::uint32_t term, Front& front) const override;
 
   std::uint32_t free_observation();
   std::uint32_t add_term(TermKind kind, std::uint32_t index);
+  std::uint32_t add_variable(bool is_block, std::uint32_t index, bool fixed);
+  void link(std::uint32_t variable, std::uint32_t term);
+  void unlink(std::uint32_t variable, std::uint32_t term);
+  void refresh(std::uint32_t term);
+  std::vector<std::uint32_t> all_variables(const Factor& factor) const;
+  std::vector<std::uint32_t> all_variables(const LandmarkTerm& landmark) const;
+  std::vector<std::uint32_t> all_variables_of_term(std::uint32_t term) const;
+  bool uses(const LandmarkTerm& landmark, std::uint32_t variable) const;
+  void place_columns(const std::vector<std::uint32_t>& all, std::vector<std::uint32_t>& variables,
+                     std::vector<Eigen::Index>& offsets) const;
+  void put_fixed_in(Prior& prior) const;
+  VariableSize size_of(const GraphVariable& variable) const;
+  std::uint32_t variable_of(const GraphVariable& variable) const;
+  void join_landmark(std::uint32_t factor);
+  void leave_landmark(std::uint32_t factor);
   void mark_dirty(std::uint32_t term);
   void linearize(std::uint32_t term);
   // These return the term's cost.
@@ -155,9 +227,23 @@ class IncrementalSolver final : private TermSource {
   RobustLoss edge_loss(std::uint32_t index) const;
   RobustLoss view_loss(const LandmarkView& view) const;
   Vector6d edge_residual(std::uint32_t index) const;
+  // The same of factors of any kind. `point`: that of a landmark's, else null. False if the
+  // function fails or gives what is not a number.
+  struct Arguments;
+  Arguments arguments(const Factor& factor, const Eigen::Vector3d* point) const;
+  bool factor_residual(const Factor& factor, const Eigen::Vector3d* point,
+                       Eigen::VectorXd& residual) const;
+  bool linearize_factor(const Factor& factor, const Eigen::Vector3d* point,
+                        const std::vector<std::uint32_t>& variables,
+                        const std::vector<Eigen::Index>& offsets, LinearSystem& rows,
+                        Eigen::Matrix<double, Eigen::Dynamic, 3>* by_point, double& cost) const;
+  double linearize_rows(std::uint32_t factor);
   Evaluation evaluate_edge(std::uint32_t index) const;
   Evaluation evaluate_landmark(std::uint32_t index) const;
   Evaluation evaluate_prior(std::uint32_t index) const;
+  Evaluation evaluate_rows(std::uint32_t factor) const;
+  void evaluate_factor_view(const FactorView& view, const Eigen::Vector3d& at,
+                            const Eigen::Vector3d& displacement, Evaluation& result) const;
   void evaluate(std::uint32_t term);
   void check(const std::vector<std::uint32_t>& linearized, const std::vector<std::uint32_t>& moved);
   std::size_t choose();
@@ -165,9 +251,15 @@ class IncrementalSolver final : private TermSource {
 
   // What a step may have to take back.
   struct Moved {
-    std::uint32_t pose;
+    std::uint32_t variable;
     Rigid3d folded;
     Vector6d folded_delta;
+  };
+  struct MovedBlock {
+    std::uint32_t variable;
+    Eigen::VectorXd inner;
+    Eigen::VectorXd folded_delta;
+    Eigen::MatrixXd basis;
   };
   void step(UpdateSummary& summary);
   void solve_step(UpdateSummary& summary, const std::vector<std::uint32_t>& terms);
@@ -178,17 +270,25 @@ class IncrementalSolver final : private TermSource {
   void relax_damping();
 
   LinearSystem rows_of_term(std::uint32_t term) const;
-  void marginalize_poses(const std::vector<std::uint32_t>& poses);
-  void add_prior(PriorTerm prior);
+  LinearSystem rows_of(const LandmarkTerm& landmark) const;
+  void marginalize_variables(const std::vector<std::uint32_t>& variables);
+  void add_prior(RowsTerm prior);
   void drop_term(std::uint32_t term);
   std::vector<std::uint32_t> slide_window();
-  Vector6d delta(std::uint32_t pose) const;
-  void fold(std::uint32_t pose);
+  GraphPrior exported(const RowsTerm& prior) const;
+  Pose& pose_with(std::uint32_t variable) { return poses_[variables_[variable].index]; }
+  const Pose& pose_with(std::uint32_t variable) const { return poses_[variables_[variable].index]; }
+  Rigid3d pose_at(std::uint32_t variable) const;
+  struct Dependence;
+  Dependence dependence_of(const GraphVariable& variable) const;
+  Eigen::Matrix3d carrier_rotation(const Block& block) const;
+  void fold(std::uint32_t variable);
   Eigen::Vector3d displacement(const LandmarkTerm& landmark) const;
   Eigen::Vector3d carried_base(const LandmarkTerm& landmark) const;
 
   IncrementalOptions options_;
   PoseTree tree_;
+  std::vector<Variable> variables_;
   std::vector<Camera> cameras_;
   std::vector<Pose> poses_;
   std::vector<Term> terms_;
@@ -203,13 +303,18 @@ class IncrementalSolver final : private TermSource {
   std::vector<std::unique_ptr<ceres::CostFunction>> edge_factors_;
   std::vector<EdgeTerm> edge_terms_;
   std::vector<std::uint32_t> edge_ids_;  // the term of an edge
-  std::vector<PriorTerm> priors_;
+  std::vector<Prior> priors_;
+  std::vector<Block> blocks_;
+  std::vector<Factor> factors_;
+  std::vector<RowsTerm> factor_terms_;      // of factors without a point
+  std::vector<std::uint32_t> free_blocks_;  // indices that may be used again
+  std::vector<std::uint32_t> free_factors_;
   std::vector<std::uint32_t> free_observations_;  // indices that may be used again
   std::vector<std::uint32_t> free_points_;
   std::uint32_t oldest_ = 0;            // poses before it do not vary
   std::vector<std::uint32_t> dirty_;    // terms
-  std::vector<std::uint32_t> touched_;  // poses whose terms changed
-  std::vector<std::uint32_t> newest_;   // poses
+  std::vector<std::uint32_t> touched_;  // variables whose terms changed
+  std::vector<std::uint32_t> newest_;   // variables
   std::vector<std::uint32_t> pending_;  // terms
   std::uint64_t stamp_ = 0;
   double squared_norm_ = 0;  // of all terms
@@ -221,8 +326,9 @@ class IncrementalSolver final : private TermSource {
   double rise_ = 0;                    // of the cost, twice
   std::vector<std::uint32_t> judged_;  // terms that were evaluated
   std::vector<Moved> moved_;
+  std::vector<MovedBlock> moved_blocks_;
   std::vector<std::uint32_t> held_back_;  // landmarks
-  std::vector<std::uint32_t> damped_;     // poses whose damping is not 0
+  std::vector<std::uint32_t> damped_;     // variables whose damping is not 0
 };
 
 }  // namespace hybrid_slam

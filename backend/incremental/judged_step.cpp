@@ -59,8 +59,12 @@ void IncrementalSolver::step(UpdateSummary& summary) {
     check(std::vector<std::uint32_t>(judged_), {});
     hold_landmarks_back();
   }
-  for (const Moved& moved : moved_) summary.moved.push_back(moved.pose);
+  for (const Moved& moved : moved_) summary.moved.push_back(variables_[moved.variable].index);
+  for (const MovedBlock& moved : moved_blocks_) {
+    summary.moved_blocks.push_back(variables_[moved.variable].index);
+  }
   moved_.clear();
+  moved_blocks_.clear();
   for (const std::uint32_t landmark : held_back_) {
     // What was displaced by a part will be displaced further. The others wait for a change.
     if (!displacement(landmarks_[landmark]).isZero(0)) mark_dirty(landmark_terms_[landmark]);
@@ -78,9 +82,15 @@ void IncrementalSolver::solve_step(UpdateSummary& summary,
   summary.undetermined = std::max(summary.undetermined, tree_.last_undetermined());
   std::vector<std::uint32_t> moved;
   tree_.solve(options_.wildfire, moved);
-  for (const std::uint32_t pose : moved) {
-    moved_.push_back({pose, poses_[pose].folded, poses_[pose].folded_delta});
-    fold(pose);
+  for (const std::uint32_t variable : moved) {
+    if (variables_[variable].is_block) {
+      const Block& block = blocks_[variables_[variable].index];
+      moved_blocks_.push_back({variable, block.inner, block.folded_delta, block.basis});
+    } else {
+      const Pose& pose = pose_with(variable);
+      moved_.push_back({variable, pose.folded, pose.folded_delta});
+    }
+    fold(variable);
   }
   check(terms, moved);
 }
@@ -89,10 +99,17 @@ void IncrementalSolver::solve_step(UpdateSummary& summary,
 void IncrementalSolver::undo_step() {
   tree_.undo_solve();
   for (const Moved& moved : moved_) {
-    poses_[moved.pose].folded = moved.folded;
-    poses_[moved.pose].folded_delta = moved.folded_delta;
+    pose_with(moved.variable).folded = moved.folded;
+    pose_with(moved.variable).folded_delta = moved.folded_delta;
+  }
+  for (MovedBlock& moved : moved_blocks_) {
+    Block& block = blocks_[variables_[moved.variable].index];
+    block.inner = std::move(moved.inner);
+    block.folded_delta = std::move(moved.folded_delta);
+    block.basis = std::move(moved.basis);
   }
   moved_.clear();
+  moved_blocks_.clear();
   for (const std::uint32_t landmark : held_back_) landmarks_[landmark].held_back.setZero();
   held_back_.clear();
 }
@@ -147,12 +164,13 @@ void IncrementalSolver::raise_damping() {
     poses.insert(poses.end(), members.begin(), members.end());
   }
   if (poses.empty()) {
-    for (const Moved& moved : moved_) poses.push_back(moved.pose);
+    for (const Moved& moved : moved_) poses.push_back(moved.variable);
+    for (const MovedBlock& moved : moved_blocks_) poses.push_back(moved.variable);
   }
   std::sort(poses.begin(), poses.end());
   poses.erase(std::unique(poses.begin(), poses.end()), poses.end());
   for (const std::uint32_t pose : poses) {
-    double& damping = poses_[pose].damping;
+    double& damping = variables_[pose].damping;
     if (damping == 0) damped_.push_back(pose);
     damping = std::max(kFirstDamping, kDampingFactor * damping);
     tree_.set_damping(pose, damping);
@@ -163,13 +181,13 @@ void IncrementalSolver::raise_damping() {
 // A step that was damped is followed by one that is less so.
 void IncrementalSolver::relax_damping() {
   for (const std::uint32_t pose : damped_) {
-    double& damping = poses_[pose].damping;
+    double& damping = variables_[pose].damping;
     damping /= kDampingFactor;
-    if (damping < kLeastDamping || poses_[pose].fixed) damping = 0;
+    if (damping < kLeastDamping || variables_[pose].fixed) damping = 0;
     tree_.set_damping(pose, damping);
-    if (!poses_[pose].fixed) touched_.push_back(pose);
+    if (!variables_[pose].fixed) touched_.push_back(pose);
   }
-  std::erase_if(damped_, [this](std::uint32_t pose) { return poses_[pose].damping == 0; });
+  std::erase_if(damped_, [this](std::uint32_t pose) { return variables_[pose].damping == 0; });
 }
 
 }  // namespace hybrid_slam

@@ -1,5 +1,6 @@
 #include <ceres/cost_function.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -27,6 +28,8 @@ void IncrementalSolver::linearize(std::uint32_t term) {
     t.cost = linearize_edge(t.index);
   } else if (t.kind == TermKind::kLandmark) {
     t.cost = linearize_landmark(t.index);
+  } else if (t.kind == TermKind::kFactor) {
+    t.cost = linearize_rows(t.index);
   }
 }
 
@@ -57,8 +60,9 @@ double IncrementalSolver::linearize_edge(std::uint32_t index) {
   using RowMajor67 = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
   std::size_t k = 0;
   for (const auto& [pose, jacobian] : {std::pair(edge.a, by_a), std::pair(edge.b, by_b)}) {
-    if (poses_[pose].fixed) continue;
-    const Vector6d& at = tree_.delta(pose);
+    const std::uint32_t variable = poses_[pose].variable;
+    if (variables_[variable].fixed) continue;
+    const Vector6d at = tree_.delta(variable);
     const Matrix6d by_left = weight * Eigen::Map<const RowMajor67>(jacobian).leftCols<6>();
     term.by_pose[k] = poses_[pose].tangent.from_left(by_left, pose == edge.a ? a : b);
     term.residual.noalias() -= term.by_pose[k] * at;
@@ -70,7 +74,7 @@ double IncrementalSolver::linearize_edge(std::uint32_t index) {
 bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkView& view,
                                        double& cost) const {
   const ceres::CostFunction& factor = *observation_factors_[view.observation];
-  const Rigid3d cam_from_world = pose(view.pose);
+  const Rigid3d cam_from_world = pose_at(view.pose);
   const double* blocks[] = {cam_from_world.params.data(), point.data()};
   Eigen::Matrix<double, 3, 7, Eigen::RowMajor> by_pose;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
@@ -87,7 +91,7 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
   view.by_point = weight * by_point;
   if (!view.fixed) {
     const Eigen::Matrix<double, 3, 6> by_left = weight * by_pose.leftCols<6>();
-    view.by_pose = poses_[view.pose].tangent.from_left(by_left, cam_from_world);
+    view.by_pose = pose_with(view.pose).tangent.from_left(by_left, cam_from_world);
     view.residual.noalias() -= view.by_pose * tree_.delta(view.pose);
   }
   return true;
@@ -99,6 +103,7 @@ double IncrementalSolver::linearize_landmark(std::uint32_t index) {
   Eigen::Vector3d step = point(index) - start;
   if (!step.allFinite()) step.setZero();
   std::vector<LandmarkView> views = landmark.views;
+  std::vector<FactorView> factors = landmark.factors;
   double cost = 0;
   const auto linearize_at = [&](const Eigen::Vector3d& at) {
     bool all = true;
@@ -106,6 +111,12 @@ double IncrementalSolver::linearize_landmark(std::uint32_t index) {
     for (std::size_t i = 0; i < views.size(); ++i) {
       views[i].usable = linearize_view(at, views[i], cost);
       all = all && (views[i].usable || !landmark.views[i].usable);
+    }
+    for (std::size_t i = 0; i < factors.size(); ++i) {
+      FactorView& view = factors[i];
+      view.usable = linearize_factor(factors_[view.factor], &at, view.variables, view.offsets,
+                                     view.rows, &view.by_point, cost);
+      all = all && (view.usable || !landmark.factors[i].usable);
     }
     return all;
   };
@@ -122,10 +133,13 @@ double IncrementalSolver::linearize_landmark(std::uint32_t index) {
   landmark.base = start + step;
   landmark.held_back.setZero();
   landmark.views = std::move(views);
+  landmark.factors = std::move(factors);
   landmark.anchor = LandmarkTerm::kNoAnchor;
-  if (!landmark.poses.empty()) {
-    landmark.anchor = landmark.poses.front();
-    landmark.in_anchor = pose(landmark.anchor) * landmark.base;
+  const auto anchor = std::find_if(landmark.poses.begin(), landmark.poses.end(),
+                                   [this](std::uint32_t v) { return !variables_[v].is_block; });
+  if (anchor != landmark.poses.end()) {
+    landmark.anchor = *anchor;
+    landmark.in_anchor = pose_at(landmark.anchor) * landmark.base;
     landmark.anchor_delta = tree_.delta(landmark.anchor);
   }
   landmark.eliminate();
@@ -163,7 +177,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
   const Eigen::Vector3d by_point = displacement(landmark);
   for (const LandmarkView& view : landmark.views) {
     if (!view.usable) continue;
-    const Rigid3d cam_from_world = pose(view.pose);
+    const Rigid3d cam_from_world = pose_at(view.pose);
     const double* blocks[] = {cam_from_world.params.data(), at.data()};
     const ceres::CostFunction& factor = *observation_factors_[view.observation];
     Eigen::Vector3d residual = Eigen::Vector3d::Zero();
@@ -182,18 +196,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
     if (!view.fixed) residual.noalias() -= view.by_pose * tree_.delta(view.pose);
     result.squared_mismatch += residual.squaredNorm();
   }
-  return result;
-}
-
-IncrementalSolver::Evaluation IncrementalSolver::evaluate_prior(std::uint32_t index) const {
-  const PriorTerm& prior = priors_[index];
-  if (prior.poses.empty()) return {};
-  Eigen::VectorXd deltas(static_cast<Eigen::Index>(6 * prior.poses.size()));
-  for (std::size_t i = 0; i < prior.poses.size(); ++i) {
-    deltas.segment<6>(static_cast<Eigen::Index>(6 * i)) = tree_.delta(prior.poses[i]);
-  }
-  Evaluation result;  // never off its linearisation, and no measure of the others' residuals
-  result.cost = (prior.rows.residual + prior.rows.jacobian * deltas).squaredNorm();
+  for (const FactorView& view : landmark.factors) evaluate_factor_view(view, at, by_point, result);
   return result;
 }
 
@@ -213,31 +216,13 @@ double IncrementalSolver::chi2(std::uint32_t observation) const {
   return residual.squaredNorm();
 }
 
-double IncrementalSolver::cost() const {
-  double sum = 0;
-  for (std::uint32_t i = 0; i < edges_.size(); ++i) {
-    if (edge_there_[i] != 0) sum += edge_residual(i).squaredNorm();
-  }
-  for (std::uint32_t i = 0; i < landmarks_.size(); ++i) {
-    const Eigen::Vector3d at = point(i);
-    for (const LandmarkView& view : landmarks_[i].views) {
-      const Rigid3d cam_from_world = pose(view.pose);
-      const double* blocks[] = {cam_from_world.params.data(), at.data()};
-      Eigen::Vector3d residual = Eigen::Vector3d::Zero();
-      if (observation_factors_[view.observation]->Evaluate(blocks, residual.data(), nullptr)) {
-        sum += residual.squaredNorm();
-      }
-    }
-  }
-  return sum / 2;
-}
-
 void IncrementalSolver::evaluate(std::uint32_t id) {
   Term& term = terms_[id];
   Evaluation at;
   if (term.kind == TermKind::kEdge) at = evaluate_edge(term.index);
   if (term.kind == TermKind::kLandmark) at = evaluate_landmark(term.index);
   if (term.kind == TermKind::kPrior) at = evaluate_prior(term.index);
+  if (term.kind == TermKind::kFactor) at = evaluate_rows(term.index);
   if (!std::isfinite(at.cost) || !std::isfinite(at.squared_mismatch)) {
     at = {0, kFarOff, kFarOff, at.rows};
   }

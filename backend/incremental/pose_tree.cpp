@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 #include <stdexcept>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -17,31 +17,48 @@ constexpr std::uint32_t kOutside = std::numeric_limits<std::uint32_t>::max();
 
 // A pivot below this part of what terms added to its diagonal is rounding: some thousand
 // eliminations, one after another, each with the precision of a double.
-constexpr double kRankTolerance = 1e-12;
+constexpr double kPivotRounding = 1e-12;
 
 void sort_unique(std::vector<std::uint32_t>& values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
-// Multiplications of a partial Cholesky of f of f + s poses.
-double factor_cost(std::size_t frontals, std::size_t separator) {
-  const double f = 6.0 * static_cast<double>(frontals);
-  const double s = 6.0 * static_cast<double>(separator);
+// Multiplications of a partial Cholesky of f of f + s rows.
+double factor_cost(Eigen::Index frontals, Eigen::Index separator) {
+  const auto f = static_cast<double>(frontals);
+  const auto s = static_cast<double>(separator);
   return f * f * f / 6 + f * f * s / 2 + f * s * s / 2;
+}
+
+// What a diagonal entry of a front is measured by.
+double unit_of(Front& front, Eigen::Index i) {
+  return std::max(front.scale()[i], front.matrix()(i, i));
 }
 
 }  // namespace
 
 void PoseTree::resize(std::size_t poses) {
-  if (poses <= clique_of_.size()) return;
-  clique_of_.resize(poses, kNone);
-  delta_.resize(poses, Vector6d::Zero());
-  sent_.resize(poses, Vector6d::Zero());
-  moved_.resize(poses, 0);
-  damping_.resize(poses, 0);
-  local_.resize(poses, kOutside);
-  slot_of_.resize(poses, 0);
+  while (clique_of_.size() < poses) {
+    add(6, false);
+    is_pose_.back() = 1;
+  }
+}
+
+void PoseTree::add(std::size_t size, bool shared) {
+  clique_of_.push_back(kNone);
+  size_.push_back(static_cast<std::uint32_t>(size));
+  offset_.push_back(delta_.size());
+  is_pose_.push_back(0);
+  shared_.push_back(shared ? 1 : 0);
+  any_shared_ = any_shared_ || shared;
+  all_poses_ = all_poses_ && size == 6;
+  delta_.resize(delta_.size() + size, 0);
+  sent_.resize(delta_.size(), 0);
+  moved_.push_back(0);
+  damping_.push_back(0);
+  local_.push_back(kOutside);
+  slot_of_.push_back(0);
 }
 
 double PoseTree::cost_of(std::span<const std::uint32_t> poses, std::vector<char>& marked) const {
@@ -52,7 +69,7 @@ double PoseTree::cost_of(std::span<const std::uint32_t> poses, std::vector<char>
       char& mark = marked[static_cast<std::size_t>(i)];
       if (mark != 0) break;
       mark = 1;
-      cost += factor_cost(at(i).frontals.size(), at(i).separator.size());
+      cost += factor_cost(at(i).factor.cols(), at(i).contribution.cols());
     }
   }
   return cost;
@@ -112,8 +129,15 @@ std::vector<std::uint32_t> PoseTree::terms_inside(const std::vector<std::uint32_
   for (const std::uint32_t pose : poses) {
     for (const std::uint32_t term : terms.terms_of(pose)) {
       const auto members = terms.poses_of(term);
-      // Once: at the first of its poses.
-      if (*std::min_element(members.begin(), members.end()) != pose) continue;
+      // Once: at the first of its poses, or the first that is not shared.
+      const auto first = [&] {
+        if (!any_shared_) return *std::min_element(members.begin(), members.end());
+        return *std::min_element(members.begin(), members.end(),
+                                 [this](std::uint32_t a, std::uint32_t b) {
+                                   return std::pair(shared_[a], a) < std::pair(shared_[b], b);
+                                 });
+      };
+      if (first() != pose) continue;
       if (std::all_of(members.begin(), members.end(),
                       [&](std::uint32_t member) { return local_[member] != kOutside; })) {
         inside.push_back(term);
@@ -144,8 +168,15 @@ std::vector<std::int32_t> PoseTree::build_cliques(const std::vector<std::uint32_
   for (const std::uint32_t pose : newest) {
     if (local_[pose] != kOutside) last[local_[pose]] = 1;
   }
+  std::vector<std::uint32_t> sizes;
+  if (!all_poses_) {
+    for (const std::uint32_t pose : poses) {
+      sizes.push_back(size_[pose]);
+      if (is_shared(pose)) last[local_[pose]] = 2;
+    }
+  }
 
-  const auto eliminated = eliminate(adjacency, last, options_.max_padding);
+  const auto eliminated = eliminate(adjacency, last, options_.max_padding, sizes);
   std::vector<std::int32_t> made;
   made.reserve(eliminated.size());
   for (const EliminationClique& wanted : eliminated) {
@@ -167,7 +198,7 @@ void PoseTree::refactor(const std::vector<std::uint32_t>& touched,
                         const std::vector<std::uint32_t>& newest, const TermSource& terms) {
   std::vector<std::int32_t> orphans;
   std::vector<std::uint32_t> poses = detach(touched, orphans);
-  std::erase_if(poses, [&](std::uint32_t pose) { return terms.terms_of(pose).empty(); });
+  std::erase_if(poses, [&](std::uint32_t pose) { return !terms.has_terms(pose); });
   for (std::uint32_t i = 0; i < poses.size(); ++i) local_[poses[i]] = i;
   const std::vector<std::uint32_t> inside = terms_inside(poses, terms);
   const std::vector<std::int32_t> made = build_cliques(poses, inside, orphans, newest, terms);
@@ -203,15 +234,26 @@ void PoseTree::refactor(const std::vector<std::uint32_t>& touched,
 }
 
 void PoseTree::add_contribution(const Clique& child, Front& front) const {
-  const auto count = static_cast<Eigen::Index>(child.separator.size());
-  for (Eigen::Index j = 0; j < count; ++j) {
-    const std::uint32_t slot_j = front.slot(child.separator[static_cast<std::size_t>(j)]);
-    for (Eigen::Index i = j; i < count; ++i) {
-      front.add(front.slot(child.separator[static_cast<std::size_t>(i)]), slot_j,
-                child.contribution.block<6, 6>(6 * i, 6 * j));
+  const std::size_t count = child.separator.size();
+  const Eigen::Index rows = child.contribution.cols();
+  Eigen::Index column = 0;
+  for (std::size_t j = 0; j < count; ++j) {
+    const std::uint32_t slot_j = front.slot(child.separator[j]);
+    const Eigen::Index width = size(child.separator[j]);
+    Eigen::Index row = column;
+    for (std::size_t i = j; i < count; ++i) {
+      const Eigen::Index height = size(child.separator[i]);
+      const std::uint32_t slot_i = front.slot(child.separator[i]);
+      if (height == 6 && width == 6) {
+        front.add(slot_i, slot_j, child.contribution.block<6, 6>(row, column));
+      } else {
+        front.add(slot_i, slot_j, child.contribution.block(row, column, height, width));
+      }
+      row += height;
     }
-    front.add_gradient(slot_j, child.contribution.row(6 * count).segment<6>(6 * j).transpose());
-    front.add_scale(slot_j, child.scale.segment<6>(6 * j));
+    front.add_gradient(slot_j, child.contribution.row(rows).segment(column, width).transpose());
+    front.add_scale(slot_j, child.scale.segment(column, width));
+    column += width;
   }
 }
 
@@ -219,42 +261,51 @@ void PoseTree::damp(const Clique& clique, Front& front) const {
   for (const std::uint32_t pose : clique.frontals) {
     if (damping_[pose] == 0) continue;
     const std::uint32_t slot = front.slot(pose);
-    const Vector6d weight = damping_[pose] * front.scale().segment<6>(6 * slot);
-    front.add(slot, slot, Matrix6d(weight.asDiagonal()));
-    front.add_gradient(slot, Vector6d(-weight.cwiseProduct(delta_[pose])));
+    const Eigen::VectorXd weight =
+        damping_[pose] * front.scale().segment(front.row(slot), size(pose));
+    front.add(slot, slot, Eigen::MatrixXd(weight.asDiagonal()));
+    front.add_gradient(slot, Eigen::VectorXd(-weight.cwiseProduct(delta_of(pose))));
   }
 }
 
 // The Cholesky factor of the frontals' block, in place.
-void PoseTree::factor_frontals(Clique& clique, const Eigen::VectorXd& scale) {
-  const auto f = static_cast<Eigen::Index>(6 * clique.frontals.size());
+void PoseTree::factor_frontals(Clique& clique, Front& front) {
+  const Eigen::Index f = clique.factor.cols();
   auto block = clique.factor.topRows(f);
-  const Eigen::VectorXd diagonal = block.diagonal();
   const Eigen::LLT<Eigen::MatrixXd> llt(block);
-  const auto pivots = llt.matrixLLT().diagonal().array().square();
-  const Eigen::VectorXd size = scale.cwiseMax(diagonal);
-  if (llt.info() == Eigen::Success && (pivots > kRankTolerance * size.array()).all()) {
+  bool sound = llt.info() == Eigen::Success;
+  for (Eigen::Index i = 0; sound && i < f; ++i) {
+    const double root = llt.matrixLLT()(i, i);
+    sound = root * root > kPivotRounding * unit_of(front, i);
+  }
+  if (sound) {
     block = llt.matrixL();
     return;
   }
   ++singular_;
-  last_undetermined_ += factor_held(clique, size);
+  last_undetermined_ += factor_held(clique, front);
 }
 
 // The same, one column after the other: where a pivot is rounding, the direction's present delta
 // counts as measured. Returns how many were.
-std::size_t PoseTree::factor_held(Clique& clique, const Eigen::VectorXd& size) const {
-  const auto f = static_cast<Eigen::Index>(6 * clique.frontals.size());
+std::size_t PoseTree::factor_held(Clique& clique, Front& front) const {
+  const Eigen::Index f = clique.factor.cols();
   auto block = clique.factor.topRows(f);
   auto gradient = clique.factor.bottomRows<1>();
+  Eigen::VectorXd present(f);
+  Eigen::Index row = 0;
+  for (const std::uint32_t pose : clique.frontals) {
+    present.segment(row, size(pose)) = delta_of(pose);
+    row += size(pose);
+  }
   std::size_t held = 0;
   for (Eigen::Index j = 0; j < f; ++j) {
-    const double unit = size[j] > 0 ? size[j] : 1;
-    if (!(block(j, j) > kRankTolerance * unit)) {
+    const double size = unit_of(front, j);
+    const double unit = size > 0 ? size : 1;
+    if (!(block(j, j) > kPivotRounding * unit)) {
       const double weight = options_.hold * unit;
       block(j, j) = std::max(block(j, j), 0.0) + weight;
-      const std::uint32_t pose = clique.frontals[static_cast<std::size_t>(j / 6)];
-      gradient[j] -= weight * delta_[pose][j % 6];
+      gradient[j] -= weight * present[j];
       ++held;
     }
     const Eigen::Index rest = f - j - 1;
@@ -271,20 +322,27 @@ void PoseTree::factor(std::int32_t index, const std::vector<std::uint32_t>& own,
                       const TermSource& terms) {
   Clique& clique = at(index);
   std::uint32_t slot = 0;
-  for (const std::uint32_t pose : clique.frontals) slot_of_[pose] = slot++;
-  for (const std::uint32_t pose : clique.separator) slot_of_[pose] = slot++;
-  Front front(slot, slot_of_);
+  std::vector<Eigen::Index> offsets;
+  offsets.reserve(clique.frontals.size() + clique.separator.size() + 1);
+  offsets.push_back(0);
+  for (const auto* members : {&clique.frontals, &clique.separator}) {
+    for (const std::uint32_t pose : *members) {
+      slot_of_[pose] = slot++;
+      offsets.push_back(offsets.back() + size(pose));
+    }
+  }
+  const Eigen::Index f = offsets[clique.frontals.size()];
+  const Eigen::Index s = offsets.back() - f;
+  Front front(std::move(offsets), slot_of_);
   for (const std::uint32_t term : own) terms.assemble(term, front);
   for (const std::int32_t child : clique.children) add_contribution(at(child), front);
   damp(clique, front);
 
-  const auto f = static_cast<Eigen::Index>(6 * clique.frontals.size());
-  const auto s = static_cast<Eigen::Index>(6 * clique.separator.size());
   Eigen::MatrixXd& matrix = front.matrix();
   clique.factor = matrix.leftCols(f);
   clique.contribution = matrix.bottomRightCorner(s + 1, s);
   clique.scale = front.scale().tail(s);
-  factor_frontals(clique, front.scale().head(f));
+  factor_frontals(clique, front);
   if (!clique.factor.topRows(f).diagonal().allFinite() || !clique.factor.row(f + s).allFinite()) {
     throw std::logic_error("PoseTree: a term is not finite");
   }
@@ -299,32 +357,51 @@ void PoseTree::factor(std::int32_t index, const std::vector<std::uint32_t>& own,
     clique.contribution.row(s).noalias() -= clique.factor.row(f + s) * separator.transpose();
   }
   clique.fresh = true;
-  last_cost_ += factor_cost(clique.frontals.size(), clique.separator.size());
+  last_cost_ += factor_cost(f, s);
+}
+
+// Whether a variable, solved in this clique from this row on, moved by more than is worth telling.
+bool PoseTree::has_changed(const Clique& clique, std::uint32_t variable, Eigen::Index row,
+                           double threshold) const {
+  const Eigen::Map<const Eigen::VectorXd> sent(sent_.data() + offset_[variable], size(variable));
+  if (is_pose_[variable] != 0) {
+    return (delta_of(variable) - sent).lpNorm<Eigen::Infinity>() > threshold;
+  }
+  const Eigen::VectorXd way = delta_of(variable) - sent;
+  const auto root = clique.factor.block(row, row, way.size(), way.size());
+  const Eigen::VectorXd in_sigmas = root.triangularView<Eigen::Lower>().transpose() * way;
+  return in_sigmas.norm() > options_.share;
 }
 
 void PoseTree::solve_clique(Clique& clique, double threshold, std::vector<std::uint32_t>& changed) {
-  const auto f = static_cast<Eigen::Index>(6 * clique.frontals.size());
-  const auto s = static_cast<Eigen::Index>(6 * clique.separator.size());
+  const Eigen::Index f = clique.factor.cols();
+  const Eigen::Index s = clique.contribution.cols();
   Eigen::VectorXd right = -clique.factor.row(f + s).transpose();
   if (s > 0) {
     Eigen::VectorXd separator(s);
-    for (std::size_t i = 0; i < clique.separator.size(); ++i) {
-      separator.segment<6>(static_cast<Eigen::Index>(6 * i)) = delta_[clique.separator[i]];
+    Eigen::Index row = 0;
+    for (const std::uint32_t pose : clique.separator) {
+      separator.segment(row, size(pose)) = delta_of(pose);
+      row += size(pose);
     }
     right.noalias() -= clique.factor.middleRows(f, s).transpose() * separator;
   }
   clique.factor.topRows(f).triangularView<Eigen::Lower>().transpose().solveInPlace(right);
   const bool finite = right.allFinite();
-  for (std::size_t i = 0; i < clique.frontals.size(); ++i) {
-    const std::uint32_t pose = clique.frontals[i];
-    if (!finite) right.segment<6>(static_cast<Eigen::Index>(6 * i)) = delta_[pose];
-    before_.push_back({pose, delta_[pose], sent_[pose]});
-    delta_[pose] = right.segment<6>(static_cast<Eigen::Index>(6 * i));
-    if ((delta_[pose] - sent_[pose]).lpNorm<Eigen::Infinity>() > threshold) {
-      sent_[pose] = delta_[pose];
+  Eigen::Index row = 0;
+  for (const std::uint32_t pose : clique.frontals) {
+    auto delta = values(delta_, pose);
+    auto sent = values(sent_, pose);
+    solved_variables_.push_back(pose);
+    before_.insert(before_.end(), delta.begin(), delta.end());
+    before_.insert(before_.end(), sent.begin(), sent.end());
+    if (finite) delta = right.segment(row, size(pose));
+    if (has_changed(clique, pose, row, threshold)) {
+      sent = delta;
       moved_[pose] = 1;
       changed.push_back(pose);
     }
+    row += size(pose);
   }
   clique.fresh = false;
 }
@@ -332,6 +409,7 @@ void PoseTree::solve_clique(Clique& clique, double threshold, std::vector<std::u
 void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
   const std::size_t first = changed.size();
   before_.clear();
+  solved_variables_.clear();
   solved_.clear();
   std::vector<std::int32_t> stack;
   for (std::size_t i = 0; i < cliques_.size(); ++i) {
@@ -354,61 +432,17 @@ void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
 }
 
 void PoseTree::undo_solve() {
-  for (const Before& before : before_) {
-    delta_[before.pose] = before.delta;
-    sent_[before.pose] = before.sent;
+  const double* value = before_.data();
+  for (const std::uint32_t variable : solved_variables_) {
+    for (std::vector<double>* of_all : {&delta_, &sent_}) {
+      std::copy_n(value, size_[variable], of_all->data() + offset_[variable]);
+      value += size_[variable];
+    }
   }
   for (const std::int32_t index : solved_) at(index).fresh = true;
   before_.clear();
+  solved_variables_.clear();
   solved_.clear();
-}
-
-// Forward and back substitution with the pose's unit vectors, which concern its clique and those
-// above only. Values are kept by pose: every pose above is frontal in one clique of the path.
-Matrix6d PoseTree::covariance(std::uint32_t pose) const {
-  using Columns = Eigen::Matrix<double, Eigen::Dynamic, 6>;
-  std::vector<std::int32_t> path;
-  for (std::int32_t i = clique_of_[pose]; i != kNone; i = at(i).parent) path.push_back(i);
-  if (path.empty()) return Matrix6d::Zero();
-  std::map<std::uint32_t, Matrix6d> value;
-  const auto gather = [&](const std::vector<std::uint32_t>& poses) {
-    Columns columns = Columns::Zero(static_cast<Eigen::Index>(6 * poses.size()), 6);
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      const auto found = value.find(poses[i]);
-      if (found != value.end())
-        columns.middleRows<6>(static_cast<Eigen::Index>(6 * i)) = found->second;
-    }
-    return columns;
-  };
-  const auto scatter = [&](const std::vector<std::uint32_t>& poses, const Columns& columns) {
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      value[poses[i]] = columns.middleRows<6>(static_cast<Eigen::Index>(6 * i));
-    }
-  };
-  value[pose] = Matrix6d::Identity();
-  const auto split = [](const Clique& clique) {
-    return std::pair(static_cast<Eigen::Index>(6 * clique.frontals.size()),
-                     static_cast<Eigen::Index>(6 * clique.separator.size()));
-  };
-  for (const std::int32_t i : path) {
-    const Clique& clique = at(i);
-    const auto [f, s] = split(clique);
-    Columns solved = gather(clique.frontals);
-    clique.factor.topRows(f).triangularView<Eigen::Lower>().solveInPlace(solved);
-    scatter(clique.frontals, solved);
-    if (s > 0) {
-      scatter(clique.separator, gather(clique.separator) - clique.factor.middleRows(f, s) * solved);
-    }
-  }
-  for (std::size_t k = path.size(); k-- > 0;) {
-    const Clique& clique = at(path[k]);
-    const auto [f, s] = split(clique);
-    Columns right = gather(clique.frontals);
-    if (s > 0) right -= clique.factor.middleRows(f, s).transpose() * gather(clique.separator);
-    clique.factor.topRows(f).triangularView<Eigen::Lower>().transpose().solveInPlace(right);
-    scatter(clique.frontals, right);
-  }
-  return value.at(pose);
 }
 
 }  // namespace hybrid_slam

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "backend/incremental/front.h"
@@ -11,7 +12,8 @@ namespace hybrid_slam {
 // (the Bayes tree of Kaess et al., iSAM2, IJRR 2012, in multifrontal form): each clique eliminates
 // a few poses, and hands what that leaves on the poses it shares with the rest to its parent. When
 // terms change, only the cliques of their poses and those above are factored anew, in a new order;
-// the subtrees below keep what they handed up.
+// the subtrees below keep what they handed up. What is said of poses here holds of every variable:
+// others have tangents of other sizes.
 //
 // Solves H delta = -g. Knows no linearisation and no landmarks: terms bring their blocks.
 class PoseTree {
@@ -20,12 +22,18 @@ class PoseTree {
     std::size_t max_padding = 2;  // blocks of zeros in a clique, for fewer cliques
     // How firmly a direction is held that no term determines: see refactor().
     double hold = 1e-9;
+    // A variable that is no pose has changed once it moved by this share of its standard deviation
+    // (given what is eliminated after it): no threshold in its units is needed.
+    double share = 0.1;
   };
 
   explicit PoseTree(const Options& options) : options_(options) {}
 
   // Poses are numbered from 0. A pose is part of the system once it was touched.
   void resize(std::size_t poses);
+  // Adds a variable with a tangent of this size. One that is shared is eliminated after all others,
+  // and TermSource::terms_of tells few of its terms.
+  void add(std::size_t size, bool shared);
 
   // Cost of factoring anew what terms on these poses would touch, in multiplications; what is in
   // `marked` (a set of clique indices, kept by the caller between calls) is already paid for.
@@ -52,10 +60,19 @@ class PoseTree {
   // measured with `weight` times the information that its terms give it. 0: not.
   void set_damping(std::uint32_t pose, double weight) { damping_[pose] = weight; }
 
-  const Vector6d& delta(std::uint32_t pose) const { return delta_[pose]; }
+  Eigen::Map<const Vector6d> delta(std::uint32_t pose) const {
+    return Eigen::Map<const Vector6d>(delta_.data() + offset_[pose]);
+  }
+  Eigen::Map<const Eigen::VectorXd> delta_of(std::uint32_t variable) const {
+    return {delta_.data() + offset_[variable], size(variable)};
+  }
+  Eigen::Index size(std::uint32_t variable) const { return size_[variable]; }
 
   // Of a pose's delta: its block of H^-1. Looks at the pose's clique and those above.
-  Matrix6d covariance(std::uint32_t pose) const;
+  Matrix6d covariance(std::uint32_t pose) const { return covariance(std::span(&pose, 1)); }
+  // Of the deltas of several variables together, in this order; distinct. What is not part of the
+  // system has zeros.
+  Eigen::MatrixXd covariance(std::span<const std::uint32_t> variables) const;
 
   std::size_t clique_count() const { return cliques_.size() - free_.size(); }
   double last_cost() const { return last_cost_; }  // of the last refactor, in multiplications
@@ -70,14 +87,26 @@ class PoseTree {
   struct Clique {
     std::vector<std::uint32_t> frontals;
     std::vector<std::uint32_t> separator;
-    Eigen::MatrixXd factor;        // (6 (f + s) + 1) x 6 f: [L11; L21; y^T]
-    Eigen::MatrixXd contribution;  // (6 s + 1) x 6 s: what it hands to its parent
-    Eigen::VectorXd scale;         // 6 s: Front::add_scale of what it hands on
+    Eigen::MatrixXd factor;        // (f + s + 1) x f: [L11; L21; y^T], in rows of the tangents
+    Eigen::MatrixXd contribution;  // (s + 1) x s: what it hands to its parent
+    Eigen::VectorXd scale;         // s: Front::add_scale of what it hands on
     std::int32_t parent = kNone;
     std::vector<std::int32_t> children;
     bool fresh = true;  // factored since it was last solved
   };
 
+  Eigen::Index rows_of(const std::vector<std::uint32_t>& variables) const {
+    Eigen::Index rows = 0;
+    for (const std::uint32_t variable : variables) rows += size_[variable];
+    return rows;
+  }
+  Eigen::Map<Eigen::VectorXd> values(std::vector<double>& of_all, std::uint32_t variable) const {
+    return {of_all.data() + offset_[variable], size_[variable]};
+  }
+  bool is_shared(std::uint32_t variable) const { return shared_[variable] != 0; }
+  std::vector<std::int32_t> paths_to_roots(std::span<const std::uint32_t> variables) const;
+  bool has_changed(const Clique& clique, std::uint32_t variable, Eigen::Index row,
+                   double threshold) const;
   Clique& at(std::int32_t i) { return cliques_[static_cast<std::size_t>(i)]; }
   const Clique& at(std::int32_t i) const { return cliques_[static_cast<std::size_t>(i)]; }
   std::int32_t make_clique();
@@ -93,24 +122,27 @@ class PoseTree {
   void factor(std::int32_t index, const std::vector<std::uint32_t>& own, const TermSource& terms);
   void add_contribution(const Clique& child, Front& front) const;
   void damp(const Clique& clique, Front& front) const;
-  void factor_frontals(Clique& clique, const Eigen::VectorXd& scale);
-  std::size_t factor_held(Clique& clique, const Eigen::VectorXd& scale) const;
+  void factor_frontals(Clique& clique, Front& front);
+  std::size_t factor_held(Clique& clique, Front& front) const;
   void solve_clique(Clique& clique, double threshold, std::vector<std::uint32_t>& changed);
 
   Options options_;
   std::vector<Clique> cliques_;
   std::vector<std::int32_t> free_;
   std::vector<std::int32_t> clique_of_;  // by pose
-  std::vector<Vector6d> delta_;
-  std::vector<Vector6d> sent_;  // the delta that the cliques below were solved with
-  std::vector<char> moved_;     // in the solve that is going on
+  std::vector<std::uint32_t> size_;      // of tangents
+  std::vector<std::size_t> offset_;      // into delta_ and sent_
+  std::vector<char> is_pose_;
+  std::vector<char> shared_;
+  bool any_shared_ = false;
+  bool all_poses_ = true;
+  std::vector<double> delta_;
+  std::vector<double> sent_;  // the deltas that the cliques below were solved with
+  std::vector<char> moved_;   // in the solve that is going on
   std::vector<double> damping_;
-  struct Before {
-    std::uint32_t pose;
-    Vector6d delta;
-    Vector6d sent;
-  };
-  std::vector<Before> before_;          // of the poses of the last solve
+  // Of the last solve: its variables, and what their deltas and what was sent were before.
+  std::vector<std::uint32_t> solved_variables_;
+  std::vector<double> before_;
   std::vector<std::int32_t> solved_;    // cliques of the last solve
   std::vector<std::uint32_t> local_;    // scratch, by pose: index among the poses at hand
   std::vector<std::uint32_t> slot_of_;  // scratch, by pose: slot in the front at hand

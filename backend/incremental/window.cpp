@@ -11,27 +11,35 @@ namespace hybrid_slam {
 
 namespace {
 
-// Poses as columns of a linear system, six each.
+// Variables as columns of a linear system.
 class Columns {
  public:
-  void add(std::uint32_t pose) {
-    if (!contains(pose)) poses_.push_back(pose);
+  explicit Columns(const PoseTree& tree) : tree_(tree) {}
+
+  void add(std::uint32_t variable) {
+    if (find(variable) == variables_.end()) {
+      variables_.push_back(variable);
+      offsets_.push_back(offsets_.back() + tree_.size(variable));
+    }
   }
-  bool contains(std::uint32_t pose) const {
-    return std::find(poses_.begin(), poses_.end(), pose) != poses_.end();
+  Eigen::Index column(std::uint32_t variable) const {
+    return offsets_[static_cast<std::size_t>(find(variable) - variables_.begin())];
   }
-  Eigen::Index column(std::uint32_t pose) const {
-    return 6 * (std::find(poses_.begin(), poses_.end(), pose) - poses_.begin());
-  }
-  Eigen::Index count() const { return static_cast<Eigen::Index>(6 * poses_.size()); }
-  const std::vector<std::uint32_t>& poses() const { return poses_; }
+  Eigen::Index count() const { return offsets_.back(); }
+  const std::vector<std::uint32_t>& variables() const { return variables_; }
 
  private:
-  std::vector<std::uint32_t> poses_;
+  std::vector<std::uint32_t>::const_iterator find(std::uint32_t variable) const {
+    return std::find(variables_.begin(), variables_.end(), variable);
+  }
+
+  const PoseTree& tree_;
+  std::vector<std::uint32_t> variables_;
+  std::vector<Eigen::Index> offsets_{0};
 };
 
 // The rows of a term over its own poses.
-LinearSystem rows_of(const EdgeTerm& edge) {
+LinearSystem rows_of_edge(const EdgeTerm& edge) {
   LinearSystem rows{Eigen::MatrixXd(6, 6 * edge.variable), edge.residual};
   for (std::size_t i = 0; i < edge.variable; ++i) {
     rows.jacobian.middleCols<6>(static_cast<Eigen::Index>(6 * i)) = edge.by_pose[i];
@@ -39,92 +47,130 @@ LinearSystem rows_of(const EdgeTerm& edge) {
   return rows;
 }
 
-// Without the landmark. Views that are not usable leave zeros.
-LinearSystem rows_of(const LandmarkTerm& landmark) {
-  const auto views = static_cast<Eigen::Index>(landmark.views.size());
-  const auto poses = static_cast<Eigen::Index>(landmark.poses.size());
-  LinearSystem rows{Eigen::MatrixXd::Zero(3 * views, 3 + 6 * poses),
-                    Eigen::VectorXd::Zero(3 * views)};
-  for (Eigen::Index i = 0; i < views; ++i) {
-    const LandmarkView& view = landmark.views[static_cast<std::size_t>(i)];
-    if (view.usable) {
-      rows.jacobian.block<3, 3>(3 * i, 0) = view.by_point;
-      rows.residual.segment<3>(3 * i) = view.residual;
-      if (view.fixed) continue;
-      const auto pose = std::find(landmark.poses.begin(), landmark.poses.end(), view.pose);
-      const Eigen::Index column = 3 + 6 * (pose - landmark.poses.begin());
-      rows.jacobian.block<3, 6>(3 * i, column) = view.by_pose;
-    }
-  }
-  return marginalize(rows, 3);
-}
-
 }  // namespace
+
+// Without the landmark. Views that are not usable leave zeros.
+LinearSystem IncrementalSolver::rows_of(const LandmarkTerm& landmark) const {
+  Columns columns(tree_);
+  for (const std::uint32_t variable : landmark.poses) columns.add(variable);
+  auto count = static_cast<Eigen::Index>(3 * landmark.views.size());
+  for (const FactorView& view : landmark.factors) count += view.rows.residual.size();
+  LinearSystem rows{Eigen::MatrixXd::Zero(count, 3 + columns.count()),
+                    Eigen::VectorXd::Zero(count)};
+  Eigen::Index row = 0;
+  for (const LandmarkView& view : landmark.views) {
+    if (view.usable) {
+      rows.jacobian.block<3, 3>(row, 0) = view.by_point;
+      rows.residual.segment<3>(row) = view.residual;
+      if (!view.fixed) {
+        rows.jacobian.block<3, 6>(row, 3 + columns.column(view.pose)) = view.by_pose;
+      }
+    }
+    row += 3;
+  }
+  for (const FactorView& view : landmark.factors) {
+    const Eigen::Index own = view.rows.residual.size();
+    if (view.usable) {
+      rows.jacobian.block(row, 0, own, 3) = view.by_point;
+      rows.residual.segment(row, own) = view.rows.residual;
+      for (std::size_t i = 0; i < view.variables.size(); ++i) {
+        const Eigen::Index width = view.offsets[i + 1] - view.offsets[i];
+        rows.jacobian.block(row, 3 + columns.column(view.variables[i]), own, width) =
+            view.rows.jacobian.middleCols(view.offsets[i], width);
+      }
+    }
+    row += own;
+  }
+  return hybrid_slam::marginalize(rows, 3);
+}
 
 LinearSystem IncrementalSolver::rows_of_term(std::uint32_t id) const {
   const Term& term = terms_[id];
   switch (term.kind) {
     case TermKind::kEdge:
-      return rows_of(edge_terms_[term.index]);
+      return rows_of_edge(edge_terms_[term.index]);
     case TermKind::kLandmark:
       return rows_of(landmarks_[term.index]);
+    case TermKind::kFactor: {
+      const RowsTerm& rows = factor_terms_[term.index];
+      if (rows.rows.residual.size() > 0) return rows.rows;
+      return {Eigen::MatrixXd(0, rows.offsets.back()), Eigen::VectorXd(0)};
+    }
     case TermKind::kPrior:
       break;
   }
-  return priors_[term.index].rows;
+  return priors_[term.index].active.rows;
 }
 
-// Linearises the terms at the present estimate, minimises the poses and the landmarks they see out
-// of them, and puts what that leaves on other poses in their place.
-void IncrementalSolver::marginalize_poses(const std::vector<std::uint32_t>& poses) {
+// Linearises the terms at the present estimate, minimises the variables and the landmarks they see
+// out of them, and puts what that leaves on others in their place. Blocks go with what they ride
+// on.
+void IncrementalSolver::marginalize_variables(const std::vector<std::uint32_t>& given) {
+  Columns columns(tree_);
+  for (const std::uint32_t variable : given) columns.add(variable);
+  for (const Block& block : blocks_) {
+    if (block.there && !variables_[block.variable].fixed &&
+        std::find(given.begin(), given.end(), block.carrier) != given.end()) {
+      columns.add(block.variable);
+    }
+  }
+  const std::vector<std::uint32_t> leaving = columns.variables();
+  const Eigen::Index leaving_columns = columns.count();
   std::vector<std::uint32_t> ids;
-  for (const std::uint32_t pose : poses) {
-    ids.insert(ids.end(), poses_[pose].terms.begin(), poses_[pose].terms.end());
+  for (const std::uint32_t variable : leaving) {
+    const Variable& of = variables_[variable];
+    ids.insert(ids.end(), of.terms.begin(), of.terms.end());
+    ids.insert(ids.end(), of.mixed.begin(), of.mixed.end());
   }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  Columns columns;
-  for (const std::uint32_t pose : poses) columns.add(pose);
   std::vector<LinearSystem> systems;
   Eigen::Index row_count = 0;
   for (const std::uint32_t id : ids) {
     linearize(id);
     systems.push_back(rows_of_term(id));
     row_count += systems.back().residual.size();
-    for (const std::uint32_t pose : poses_of(id)) columns.add(pose);
+    for (const std::uint32_t variable : poses_of(id)) columns.add(variable);
   }
 
   LinearSystem all{Eigen::MatrixXd::Zero(row_count, columns.count()), Eigen::VectorXd(row_count)};
   Eigen::Index row = 0;
   for (std::size_t k = 0; k < ids.size(); ++k) {
     const Eigen::Index rows = systems[k].residual.size();
-    const auto members = poses_of(ids[k]);
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      all.jacobian.block(row, columns.column(members[i]), rows, 6) =
-          systems[k].jacobian.middleCols(static_cast<Eigen::Index>(6 * i), 6);
+    Eigen::Index column = 0;
+    for (const std::uint32_t variable : poses_of(ids[k])) {
+      const Eigen::Index width = tree_.size(variable);
+      all.jacobian.block(row, columns.column(variable), rows, width) =
+          systems[k].jacobian.middleCols(column, width);
+      column += width;
     }
     all.residual.segment(row, rows) = systems[k].residual;
     row += rows;
   }
-  PriorTerm prior;
-  prior.poses.assign(columns.poses().begin() + static_cast<std::ptrdiff_t>(poses.size()),
-                     columns.poses().end());
-  prior.rows = marginalize(all, static_cast<Eigen::Index>(6 * poses.size()));
+  RowsTerm prior;
+  prior.variables.assign(columns.variables().begin() + static_cast<std::ptrdiff_t>(leaving.size()),
+                         columns.variables().end());
+  for (const std::uint32_t variable : prior.variables) {
+    prior.offsets.push_back(prior.offsets.back() + tree_.size(variable));
+  }
+  prior.rows = hybrid_slam::marginalize(all, leaving_columns);
   for (const std::uint32_t id : ids) drop_term(id);
-  for (const std::uint32_t pose : poses) {
-    fold(pose);
-    poses_[pose].fixed = true;
+  for (const std::uint32_t variable : leaving) {
+    Variable& of = variables_[variable];
+    if (of.is_block) blocks_[of.index].given.values = block(of.index);
+    fold(variable);
+    of.fixed = of.gone = true;
   }
   if (prior.rows.residual.size() > 0) add_prior(std::move(prior));
 }
 
-void IncrementalSolver::add_prior(PriorTerm prior) {
-  priors_.push_back(std::move(prior));
+void IncrementalSolver::add_prior(RowsTerm rows) {
+  priors_.push_back({rows, rows});
   const std::uint32_t id =
       add_term(TermKind::kPrior, static_cast<std::uint32_t>(priors_.size()) - 1);
-  for (const std::uint32_t pose : poses_of(id)) {
-    poses_[pose].terms.push_back(id);
-    touched_.push_back(pose);
+  for (const std::uint32_t variable : poses_of(id)) {
+    link(variable, id);
+    touched_.push_back(variable);
   }
   terms_[id].cost = evaluate_prior(terms_[id].index).cost;
 }
@@ -132,21 +178,29 @@ void IncrementalSolver::add_prior(PriorTerm prior) {
 // The term's information has gone elsewhere. A landmark stays where it is, as if newly made.
 void IncrementalSolver::drop_term(std::uint32_t id) {
   Term& term = terms_[id];
-  for (const std::uint32_t pose : poses_of(id)) {
-    touched_.push_back(pose);
-    std::erase(poses_[pose].terms, id);
-  }
+  const auto varying = poses_of(id);
+  touched_.insert(touched_.end(), varying.begin(), varying.end());
+  for (const std::uint32_t variable : all_variables_of_term(id)) unlink(variable, id);
   squared_norm_ -= term.squared_norm;
   rows_ -= term.rows;
   mismatch_ -= term.mismatch;
   term.squared_norm = term.mismatch = term.cost = 0;
   term.rows = 0;
+  const auto forget_factor = [this](std::uint32_t factor) {
+    factors_[factor].there = false;
+    factors_[factor].function.reset();
+    factors_[factor].given = {};
+    free_factors_.push_back(factor);
+  };
   if (term.kind == TermKind::kEdge) {
     edge_there_[term.index] = 0;
     edge_factors_[term.index].reset();
     edge_terms_[term.index].variable = 0;
   } else if (term.kind == TermKind::kPrior) {
     priors_[term.index] = {};
+  } else if (term.kind == TermKind::kFactor) {
+    factor_terms_[term.index] = {};
+    forget_factor(term.index);
   } else {
     LandmarkTerm& landmark = landmarks_[term.index];
     for (const LandmarkView& view : landmark.views) {
@@ -154,6 +208,7 @@ void IncrementalSolver::drop_term(std::uint32_t id) {
       observation_factors_[view.observation].reset();
       free_observations_.push_back(view.observation);
     }
+    for (const FactorView& view : landmark.factors) forget_factor(view.factor);
     LandmarkTerm renewed;
     renewed.base = point(term.index);
     landmark = std::move(renewed);
@@ -167,11 +222,13 @@ std::vector<std::uint32_t> IncrementalSolver::slide_window() {
   const std::size_t slack = std::max<std::size_t>(1, window / 10);
   std::vector<std::uint32_t> active;
   for (std::uint32_t i = oldest_; i < poses_.size(); ++i) {
-    if (!poses_[i].fixed) active.push_back(i);
+    if (!variables_[poses_[i].variable].fixed) active.push_back(i);
   }
   if (window == 0 || active.size() < window + slack) return {};
   active.resize(active.size() - window);
-  marginalize_poses(active);
+  std::vector<std::uint32_t> variables;
+  for (const std::uint32_t i : active) variables.push_back(poses_[i].variable);
+  marginalize_variables(variables);
   oldest_ = active.back() + 1;
   return active;
 }

@@ -55,8 +55,13 @@ const char* fault_of(const FactorGraph& graph, const GraphPrior& prior) {
   for (const std::uint32_t frame : prior.frames) {
     if (frame >= graph.frames.size()) return "no such frame";
   }
-  const auto columns = static_cast<Eigen::Index>(6 * prior.frames.size());
-  if (prior.bases.size() != prior.frames.size() || prior.jacobian.cols() != columns ||
+  for (const std::uint32_t block : prior.blocks) {
+    if (block >= graph.blocks.size()) return "no such block";
+  }
+  auto columns = static_cast<Eigen::Index>(6 * prior.frames.size());
+  for (const PriorBlock& base : prior.block_bases) columns += base.tangent_size();
+  if (prior.bases.size() != prior.frames.size() ||
+      prior.block_bases.size() != prior.blocks.size() || prior.jacobian.cols() != columns ||
       prior.jacobian.rows() != prior.residual.size() || prior.residual.size() == 0) {
     return "sizes do not agree";
   }
@@ -100,6 +105,38 @@ const char* fault_of(const FactorGraph&, const GraphPoint& point) {
   return point.in_world.allFinite() ? nullptr : "position is not finite";
 }
 
+std::string block_faults(const FactorGraph& graph) {
+  for (std::size_t i = 0; i < graph.blocks.size(); ++i) {
+    std::string reason = block_fault(graph.blocks[i]);
+    const std::uint32_t frame = graph.blocks[i].rides_with;
+    if (reason.empty() && frame != GraphBlock::kNone && frame >= graph.frames.size()) {
+      reason = kNoFrame;
+    }
+    if (!reason.empty()) return fault("block", i, reason.c_str());
+  }
+  return {};
+}
+
+std::string factor_faults(const FactorGraph& graph) {
+  constexpr const char* kAbsent = "is not there";
+  const auto size_of = [&](const GraphVariable& variable) -> VariableSize {
+    const std::size_t i = variable.index;
+    if (variable.kind == GraphVariable::Kind::kPose) {
+      return i < graph.frames.size() ? VariableSize{7, nullptr} : VariableSize{0, kAbsent};
+    }
+    if (variable.kind == GraphVariable::Kind::kPoint) {
+      return i < graph.points.size() ? VariableSize{3, nullptr} : VariableSize{0, kAbsent};
+    }
+    if (i >= graph.blocks.size()) return {0, kAbsent};
+    return {static_cast<int>(graph.blocks[i].values.size()), nullptr};
+  };
+  for (std::size_t i = 0; i < graph.factors.size(); ++i) {
+    const std::string reason = factor_fault(graph.factors[i], size_of);
+    if (!reason.empty()) return fault("factor", i, reason.c_str());
+  }
+  return {};
+}
+
 template <typename T>
 std::string first_fault(const FactorGraph& graph, const std::vector<T>& items, const char* what) {
   for (std::size_t i = 0; i < items.size(); ++i) {
@@ -132,6 +169,8 @@ std::string FactorGraph::validate() const {
   if (wrong.empty()) wrong = first_fault(*this, priors, "prior");
   if (wrong.empty()) wrong = first_fault(*this, similarities, "similarity");
   if (wrong.empty()) wrong = first_fault(*this, similarity_edges, "similarity edge");
+  if (wrong.empty()) wrong = block_faults(*this);
+  if (wrong.empty()) wrong = factor_faults(*this);
   return wrong;
 }
 

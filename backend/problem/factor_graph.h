@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "backend/problem/graph_factor.h"
 #include "cameras/camera.h"
 #include "cameras/geometry/sim3d.h"
+#include "factors/prior_block.h"
 
 namespace hybrid_slam {
 
@@ -53,8 +55,10 @@ struct GraphEdge {
 struct GraphPrior {
   std::vector<std::uint32_t> frames;
   std::vector<Rigid3d> bases;  // as frames
-  Eigen::MatrixXd jacobian;    // rows x 6 frames
+  Eigen::MatrixXd jacobian;    // rows x (6 frames + tangents of the blocks)
   Eigen::VectorXd residual;
+  std::vector<std::uint32_t> blocks = {};
+  std::vector<PriorBlock> block_bases = {};  // as blocks; carriers count among `frames`
 };
 
 // The same with scale, for maps whose scale may have drifted: factors/relative_similarity_factor.h.
@@ -82,6 +86,8 @@ struct FactorGraph {
   std::vector<GraphPrior> priors;
   std::vector<GraphSimilarity> similarities;
   std::vector<GraphSimilarityEdge> similarity_edges;
+  std::vector<GraphBlock> blocks;
+  std::vector<GraphFactor> factors;
 
   // Empty if every index is in range, every number finite and every sigma and information
   // positive, else the first thing that is wrong. The solver requires it.

@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "backend/problem/joint_frame.h"
+#include "factors/left_jacobian.h"
 #include "factors/linear_prior.h"
 #include "factors/make_reprojection_factor.h"
 #include "factors/manifolds.h"
@@ -71,6 +73,31 @@ class SharedLoss {
   ceres::LossFunction* made_ = nullptr;
 };
 
+// A manifold that others have, too: a problem owns those that it is given.
+class SharedManifold final : public ceres::Manifold {
+ public:
+  explicit SharedManifold(std::shared_ptr<const ceres::Manifold> shared)
+      : shared_(std::move(shared)) {}
+
+  int AmbientSize() const override { return shared_->AmbientSize(); }
+  int TangentSize() const override { return shared_->TangentSize(); }
+  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override {
+    return shared_->Plus(x, delta, x_plus_delta);
+  }
+  bool PlusJacobian(const double* x, double* jacobian) const override {
+    return shared_->PlusJacobian(x, jacobian);
+  }
+  bool Minus(const double* y, const double* x, double* y_minus_x) const override {
+    return shared_->Minus(y, x, y_minus_x);
+  }
+  bool MinusJacobian(const double* x, double* jacobian) const override {
+    return shared_->MinusJacobian(x, jacobian);
+  }
+
+ private:
+  std::shared_ptr<const ceres::Manifold> shared_;
+};
+
 class Builder {
  public:
   Builder(FactorGraph& graph, const GraphFactors& factors) : graph_(graph), factors_(factors) {
@@ -88,10 +115,14 @@ class Builder {
                      SharedLoss(observation_loss, options.chi2_stereo));
     add_edges(graph_.edges, factors_.edges, SharedLoss(options.loop_loss, options.chi2_loop),
               [this](std::uint32_t i) { return pose_block(i); });
+    for (std::size_t i = 0; i < graph_.factors.size(); ++i) add_factor(i);
     for (std::size_t i = 0; i < graph_.priors.size(); ++i) {
       std::vector<double*> blocks;
       for (const std::uint32_t frame : graph_.priors[i].frames) {
         blocks.push_back(pose_block(frame));
+      }
+      for (const std::uint32_t block : graph_.priors[i].blocks) {
+        blocks.push_back(other_block(block));
       }
       problem_->AddResidualBlock(factors_.priors[i].get(), nullptr, blocks);
     }
@@ -142,11 +173,49 @@ class Builder {
     }
   }
 
-  // Those with a refined camera that no other frame has, unless edges or priors need the pose as a
-  // block of its own.
+  void add_factor(std::size_t i) {
+    if (factors_.factor_active[i] == 0) return;
+    const GraphFactor& factor = graph_.factors[i];
+    std::vector<double*> blocks;
+    bool varies = false;
+    for (const GraphVariable& variable : factor.variables) {
+      double* block = block_of(variable);
+      varies = varies || !problem_->IsParameterBlockConstant(block);
+      blocks.push_back(block);
+    }
+    if (!varies) return;
+    // Evaluated alone; the problem does not own it.
+    auto* function = const_cast<ceres::CostFunction*>(factors_.factors[i].get());
+    problem_->AddResidualBlock(function, make_loss(factor.loss, factor.threshold), blocks);
+  }
+
+  double* block_of(const GraphVariable& variable) {
+    if (variable.kind == GraphVariable::Kind::kPose) return pose_block(variable.index);
+    if (variable.kind == GraphVariable::Kind::kBlock) return other_block(variable.index);
+    GraphPoint& point = graph_.points[variable.index];
+    double* block = point.in_world.data();
+    if (!problem_->HasParameterBlock(block)) problem_->AddParameterBlock(block, 3);
+    if (point.fixed) problem_->SetParameterBlockConstant(block);
+    return block;
+  }
+
+  double* other_block(std::uint32_t index) {
+    GraphBlock& block = graph_.blocks[index];
+    double* values = block.values.data();
+    if (problem_->HasParameterBlock(values)) return values;
+    problem_->AddParameterBlock(values, static_cast<int>(block.values.size()));
+    if (block.manifold != nullptr) {
+      problem_->SetManifold(values, new SharedManifold(block.manifold));
+    }
+    if (block.fixed) problem_->SetParameterBlockConstant(values);
+    return values;
+  }
+
+  // Those with a refined camera that no other frame has, unless edges, factors or priors need the
+  // pose as a block of its own.
   void find_joint_frames() {
     made_.joint_frames.resize(graph_.frames.size());
-    if (!graph_.edges.empty() || !graph_.priors.empty()) return;
+    if (!graph_.edges.empty() || !graph_.priors.empty() || !graph_.factors.empty()) return;
     std::vector<int> frames_of(graph_.cameras.size(), 0);
     for (const GraphFrame& frame : graph_.frames) {
       if (frame.camera != GraphFrame::kNoCamera) ++frames_of[frame.camera];
@@ -248,14 +317,22 @@ GraphFactors make_factors(const FactorGraph& graph) {
     factors.edges.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
   }
   for (const GraphPrior& prior : graph.priors) {
-    factors.priors.push_back(
-        std::make_unique<LinearPrior>(prior.bases, prior.jacobian, prior.residual));
+    factors.priors.push_back(std::make_unique<LinearPrior>(prior.bases, prior.jacobian,
+                                                           prior.residual, prior.block_bases));
   }
   factors.similarity_edges.reserve(graph.similarity_edges.size());
   for (const GraphSimilarityEdge& edge : graph.similarity_edges) {
     factors.similarity_edges.push_back(
         std::make_unique<RelativeSimilarityFactor>(edge.a_from_b, edge.information));
   }
+  for (const GraphFactor& factor : graph.factors) {
+    std::vector<char> is_pose;
+    for (const GraphVariable& variable : factor.variables) {
+      is_pose.push_back(variable.kind == GraphVariable::Kind::kPose ? 1 : 0);
+    }
+    factors.factors.push_back(left_jacobian(factor.function, is_pose));
+  }
+  factors.factor_active.assign(graph.factors.size(), 1);
   return factors;
 }
 
@@ -276,6 +353,29 @@ std::vector<double> observations_chi2(const FactorGraph& graph, const GraphFacto
   return values;
 }
 
+std::vector<double> factors_chi2(const FactorGraph& graph, const GraphFactors& factors) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < graph.factors.size(); ++i) {
+    std::vector<const double*> blocks;
+    for (const GraphVariable& variable : graph.factors[i].variables) {
+      switch (variable.kind) {
+        case GraphVariable::Kind::kPose:
+          blocks.push_back(graph.frames[variable.index].cam_from_world.params.data());
+          break;
+        case GraphVariable::Kind::kPoint:
+          blocks.push_back(graph.points[variable.index].in_world.data());
+          break;
+        case GraphVariable::Kind::kBlock:
+          blocks.push_back(graph.blocks[variable.index].values.data());
+      }
+    }
+    Eigen::VectorXd residual(factors.factors[i]->num_residuals());
+    const bool done = factors.factors[i]->Evaluate(blocks.data(), residual.data(), nullptr);
+    values.push_back(done ? residual.squaredNorm() : kInfinity);
+  }
+  return values;
+}
+
 double edges_chi2(const FactorGraph& graph, const GraphFactors& factors) {
   double sum = 0;
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
@@ -287,6 +387,9 @@ double edges_chi2(const FactorGraph& graph, const GraphFactors& factors) {
     std::vector<const double*> blocks;
     for (const std::uint32_t frame : graph.priors[i].frames) {
       blocks.push_back(graph.frames[frame].cam_from_world.params.data());
+    }
+    for (const std::uint32_t block : graph.priors[i].blocks) {
+      blocks.push_back(graph.blocks[block].values.data());
     }
     Eigen::VectorXd residual(graph.priors[i].residual.size());
     factors.priors[i]->Evaluate(blocks.data(), residual.data(), nullptr);

@@ -25,7 +25,9 @@ struct GraphFactors {
   std::vector<std::unique_ptr<ceres::CostFunction>> edges;
   std::vector<std::unique_ptr<ceres::CostFunction>> priors;
   std::vector<std::unique_ptr<ceres::CostFunction>> similarity_edges;
-  std::vector<char> active;  // per observation; 0: set aside
+  std::vector<std::shared_ptr<const ceres::CostFunction>> factors;  // with left Jacobians
+  std::vector<char> active;                                         // per observation; 0: set aside
+  std::vector<char> factor_active;                                  // per factor of any kind
 };
 
 // Requires a valid graph. All observations are active.
@@ -34,6 +36,9 @@ GraphFactors make_factors(const FactorGraph& graph);
 // Squared whitened residuals at the present estimate, per observation; infinite where the point
 // does not project.
 std::vector<double> observations_chi2(const FactorGraph& graph, const GraphFactors& factors);
+
+// The same of the factors of any kind; infinite where a function fails.
+std::vector<double> factors_chi2(const FactorGraph& graph, const GraphFactors& factors);
 
 // Of all edges of both kinds and all priors together.
 double edges_chi2(const FactorGraph& graph, const GraphFactors& factors);

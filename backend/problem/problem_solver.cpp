@@ -54,6 +54,7 @@ std::shared_ptr<ceres::ParameterBlockOrdering> elimination_order(FactorGraph& gr
   }
   for (GraphSimilarity& vertex : graph.similarities) add(vertex.cam_from_world.params.data(), 1);
   for (GraphCamera& camera : graph.cameras) add(params_of(camera.camera), 1);
+  for (GraphBlock& block : graph.blocks) add(block.values.data(), 1);
   return ordering;
 }
 
@@ -63,7 +64,9 @@ bool is_finite(const FactorGraph& graph) {
          std::all_of(graph.points.begin(), graph.points.end(),
                      [](const auto& p) { return p.in_world.allFinite(); }) &&
          std::all_of(graph.similarities.begin(), graph.similarities.end(),
-                     [](const auto& s) { return s.cam_from_world.params.allFinite(); });
+                     [](const auto& s) { return s.cam_from_world.params.allFinite(); }) &&
+         std::all_of(graph.blocks.begin(), graph.blocks.end(),
+                     [](const auto& block) { return block.values.allFinite(); });
 }
 
 ceres::LinearSolverType linear_solver_of(const FactorGraph& graph, LinearSolver wanted) {

@@ -20,6 +20,11 @@ double half_sum(const std::vector<double>& observations, double edges) {
   return sum / 2;
 }
 
+// Squared, of all that is no observation.
+double others_chi2(const FactorGraph& graph, const GraphFactors& factors) {
+  return 2 * half_sum(factors_chi2(graph, factors), edges_chi2(graph, factors));
+}
+
 // Of the active observations that project both before and after.
 void write_kept_costs(const GraphFactors& factors, const std::vector<double>& before,
                       const std::vector<double>& after, double edges_before, double edges_after,
@@ -80,18 +85,21 @@ struct Estimate {
   std::vector<GraphFrame> frames;
   std::vector<GraphPoint> points;
   std::vector<GraphSimilarity> similarities;
+  std::vector<GraphBlock> blocks;
 
   explicit Estimate(const FactorGraph& graph)
       : cameras(graph.cameras),
         frames(graph.frames),
         points(graph.points),
-        similarities(graph.similarities) {}
+        similarities(graph.similarities),
+        blocks(graph.blocks) {}
 
   void restore(FactorGraph& graph) const {
     graph.cameras = cameras;
     graph.frames = frames;
     graph.points = points;
     graph.similarities = similarities;
+    graph.blocks = blocks;
   }
 };
 
@@ -128,13 +136,17 @@ GraphSummary solve_graph(FactorGraph& graph, const ProblemOptions& options,
 
   GraphSummary summary;
   summary.unprojectable = inactive(factors);
-  const double edges_before = edges_chi2(graph, factors);
+  const std::vector<double> factors_before = factors_chi2(graph, factors);
+  for (std::size_t i = 0; i < factors_before.size(); ++i) {
+    factors.factor_active[i] = std::isfinite(factors_before[i]);
+  }
+  const double edges_before = others_chi2(graph, factors);
   summary.initial_cost = half_sum(before, edges_before);
   const Estimate estimate(graph);
   run_rounds(graph, options, stop, progress, factors, summary);
   if (summary.end == SolveEnd::kFailed) estimate.restore(graph);
   const std::vector<double> after = observations_chi2(graph, factors);
-  const double edges_after = edges_chi2(graph, factors);
+  const double edges_after = others_chi2(graph, factors);
   summary.final_cost = half_sum(after, edges_after);
   test_outliers(options, after, factors);
   write_kept_costs(factors, before, after, edges_before, edges_after, summary);
@@ -165,7 +177,7 @@ double chi2(const FactorGraph& graph, const GraphEdge& edge) {
 
 double cost(const FactorGraph& graph) {
   const GraphFactors factors = make_factors(graph);
-  return half_sum(observations_chi2(graph, factors), edges_chi2(graph, factors));
+  return half_sum(observations_chi2(graph, factors), others_chi2(graph, factors));
 }
 
 }  // namespace hybrid_slam

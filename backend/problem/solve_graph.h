@@ -39,9 +39,10 @@ struct GraphSummary {
   double seconds = 0;
 };
 
-// Runs the rounds of `options` on a graph and moves its estimate: poses, points and the refined
-// camera parameters. The gauge is held by what is fixed. After SolveEnd::kFailed the graph is as it
-// was. Throws std::invalid_argument if the graph or the options are not valid.
+// Runs the rounds of `options` on a graph and moves its estimate: poses, points, blocks and the
+// refined camera parameters. Factors whose function fails at the start are left out. The gauge is
+// held by what is fixed. After SolveEnd::kFailed the graph is as it was. Throws
+// std::invalid_argument if the graph or the options are not valid.
 GraphSummary solve_graph(FactorGraph& graph, const ProblemOptions& options,
                          const std::stop_token& stop = {},
                          const std::function<void(const IterationReport&)>& progress = {});
@@ -50,7 +51,7 @@ GraphSummary solve_graph(FactorGraph& graph, const ProblemOptions& options,
 double chi2(const FactorGraph& graph, const GraphObservation& observation);
 double chi2(const FactorGraph& graph, const GraphEdge& edge);
 
-// Half the sum of squares of all observations that project and of all edges.
+// Half the sum of squares of all observations that project, all edges, priors and factors.
 double cost(const FactorGraph& graph);
 
 }  // namespace hybrid_slam
