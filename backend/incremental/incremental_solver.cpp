@@ -206,9 +206,15 @@ UpdateSummary IncrementalSolver::update() {
   credit_ = std::min(credit_ + options_.budget, options_.burst * options_.budget);
   std::vector<std::uint32_t> linearized;
   std::vector<std::uint32_t> moved;
-  if (dirty_.empty() && touched_.empty()) summary.relinearized += choose();
+  bool to_solve = !jumped_.empty();
+  if (to_solve) {
+    summary.relinearized += settle_moves();
+  } else if (dirty_.empty() && touched_.empty()) {
+    summary.relinearized += choose();
+  }
   for (int step = 0; step < options_.max_steps; ++step) {
-    if (dirty_.empty() && touched_.empty()) break;
+    if (dirty_.empty() && touched_.empty() && !to_solve) break;
+    to_solve = false;
     linearized = std::exchange(dirty_, {});
     for (const std::uint32_t term : linearized) {
       linearize(term);
@@ -216,11 +222,13 @@ UpdateSummary IncrementalSolver::update() {
       const auto poses = poses_of(term);
       touched_.insert(touched_.end(), poses.begin(), poses.end());
     }
-    tree_.refactor(touched_, newest_, *this);
-    touched_.clear();
+    if (!touched_.empty()) {
+      tree_.refactor(touched_, newest_, *this);
+      touched_.clear();
+      summary.poses += tree_.last_poses();
+      summary.multiplications += tree_.last_cost();
+    }
     ++summary.steps;
-    summary.poses += tree_.last_poses();
-    summary.multiplications += tree_.last_cost();
     moved.clear();
     tree_.solve(options_.wildfire, moved);
     for (const std::uint32_t pose : moved) fold(pose);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "backend/incremental/edge_term.h"
@@ -76,6 +77,13 @@ class IncrementalSolver final : private TermSource {
   void remove_edge(std::uint32_t edge);
   void remove_point(std::uint32_t point);  // with its observations
 
+  // The estimate of these poses jumps: a loop was closed, or something else solved them. Points
+  // follow. The next updates begin there: they linearise anew what this took off its linearisation
+  // (terms between poses that moved as one rigid body stay as they are), and take back what the
+  // terms do not agree with. Poses that are fixed, the window's
+  // marginalised ones among them, must not be moved: std::logic_error, and nothing is done.
+  void move_poses(const std::vector<std::pair<std::uint32_t, Rigid3d>>& cam_from_world);
+
   // The covariance of a pose's left perturbation, exp(d) * cam_from_world, given all that was taken
   // in; conditional on what is fixed.
   Matrix6d covariance(std::uint32_t pose) const;
@@ -147,6 +155,7 @@ class IncrementalSolver final : private TermSource {
   void evaluate(std::uint32_t term);
   void check(const std::vector<std::uint32_t>& linearized, const std::vector<std::uint32_t>& moved);
   std::size_t choose();
+  std::size_t settle_moves();
   double typical() const;
 
   LinearSystem rows_of_term(std::uint32_t term) const;
@@ -182,6 +191,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<std::uint32_t> dirty_;    // terms
   std::vector<std::uint32_t> touched_;  // poses whose terms changed
   std::vector<std::uint32_t> newest_;   // poses
+  std::vector<std::uint32_t> jumped_;   // poses that were moved since the last update
   std::vector<std::uint32_t> pending_;  // terms
   std::uint64_t stamp_ = 0;
   double squared_norm_ = 0;  // of all terms

@@ -42,6 +42,16 @@ class PoseTree {
   // more. Appends the poses whose delta changed by more than that to `changed`.
   void solve(double threshold, std::vector<std::uint32_t>& changed);
 
+  // Moves a pose by as much, whatever the system says. The next solve tells what changes against
+  // that.
+  void shift(std::uint32_t pose, const Vector6d& by) {
+    delta_[pose] += by;
+    sent_[pose] = delta_[pose];
+    for (std::int32_t i = clique_of_[pose]; i != kNone && !at(i).fresh; i = at(i).parent) {
+      at(i).fresh = true;
+    }
+  }
+
   const Vector6d& delta(std::uint32_t pose) const { return delta_[pose]; }
 
   // Of a pose's delta: its block of H^-1. Looks at the pose's clique and those above.
