@@ -76,8 +76,8 @@ class Backend {
   // Takes in a bundle adjustment of everything that was made of an earlier snapshot (solve_full),
   // when the map had been moved by `closings_then` loops: it is carried over those that were closed
   // since. Keyframes born since follow through the spanning tree, landmarks with their reference
-  // keyframe. Left out is a result that is older than one which was taken in, than the loops that are
-  // remembered, or than one that changed scales.
+  // keyframe. Left out is a result that is older than one which was taken in, than the loops that
+  // are remembered, or than one that changed scales.
   BundleSummary take_in_full(BundleResult result, std::size_t closings_then);
 
   // Bundle adjustment of everything but the origin: solve_full and take_in_full.
