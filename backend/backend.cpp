@@ -11,6 +11,9 @@ namespace hybrid_slam {
 
 namespace {
 
+// Loops over which an adjustment of everything that takes its time is carried.
+constexpr std::size_t kMaxMoves = 16;
+
 PoseConstraint constraint_of(const LoopMeasurement& loop) {
   PoseConstraint constraint;
   constraint.a = loop.keyframe;
@@ -76,6 +79,17 @@ BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
   return take_in(smoother().update(snapshot(), newest));
 }
 
+// The oldest.
+void Backend::forget_moves(std::size_t count) {
+  moves_.erase(moves_.begin(), moves_.begin() + static_cast<std::ptrdiff_t>(count));
+  first_move_ += count;
+}
+
+// The smoother follows. What it has marginalised cannot, nor can factors of other cameras.
+void Backend::moved_by_others(bool cameras_too) {
+  if (cameras_too || options_.incremental.solver.window > 0) smoother_.reset();
+}
+
 MapSmoother& Backend::smoother() {
   if (!smoother_) {
     smoother_.emplace(options_.incremental);
@@ -106,16 +120,23 @@ LoopOutcome Backend::close(const LoopMeasurement& loop) {
 // would be neither here nor there.
 void Backend::take_in(const LoopClosure& closure, const LoopGraphOptions& options) {
   std::vector<LoopMeasurement> taken;
+  moved_by_others(false);
   for (const std::size_t i : closure.taken) {
     PoseConstraint loop = constraint_of(refused_[i]);
     loop.information = motion_information(view(), loop.a, loop.b, loop.a_from_b, options);
     closed_.push_back(loop);
+    if (smoother_) smoother_->add_loop(loop);
     taken.push_back(refused_[i]);
   }
   for (auto i = closure.taken.rbegin(); i != closure.taken.rend(); ++i) {
     refused_.erase(refused_.begin() + static_cast<std::ptrdiff_t>(*i));
   }
-  smoother_.reset();
+  moves_.push_back(move_of(view(), closure.correction));
+  if (options.with_scale) {
+    forget_moves(moves_.size());  // motions between neighbours have another size now
+  } else if (moves_.size() > kMaxMoves) {
+    forget_moves(1);
+  }
   map_.move(closure.correction.cam_from_world, closure.correction.point_in_world);
   for (const LoopMeasurement& loop : taken) merge_sides(loop);
 }
@@ -134,15 +155,21 @@ BundleResult solve_full(const MapSnapshot& map, const FullBundleOptions& options
   return solve_bundle(map, make_full_bundle(map, options), stop);
 }
 
-BundleSummary Backend::take_in_full(BundleResult result) {
+BundleSummary Backend::take_in_full(BundleResult result, std::size_t closings_then) {
+  if (closings_then > closings()) {
+    throw std::logic_error("Backend::take_in_full: a result of loops that were not closed");
+  }
+  if (closings_then < first_move_) return result.summary;
+  forget_moves(closings_then - first_move_);
   if (result.cam_from_world.empty()) return result.summary;
-  smoother_.reset();
+  for (const LoopMove& move : moves_) carry_over(move, view(), result);
+  moved_by_others(!result.cameras.empty());
   carry_the_rest(view(), result);
   return take_in(std::move(result));
 }
 
 BundleSummary Backend::optimize_full(std::stop_token stop) {
-  return take_in_full(solve_full(view(), options_.full, stop));
+  return take_in_full(solve_full(view(), options_.full, stop), closings());
 }
 
 BundleSummary Backend::take_in(BundleResult result) {

@@ -11,6 +11,7 @@
 #include "backend/problem/full_bundle.h"
 #include "backend/problem/local_bundle.h"
 #include "backend/problem/loop_closure.h"
+#include "backend/problem/loop_correction.h"
 
 namespace hybrid_slam {
 
@@ -69,10 +70,15 @@ class Backend {
   // later one may agree with it.
   LoopOutcome close(const LoopMeasurement& loop);
 
-  // Takes in a bundle adjustment of everything that was made of an earlier snapshot (solve_full):
-  // keyframes born since follow through the spanning tree, landmarks with their reference keyframe.
-  // What was solved before a loop was closed must not be taken in after it.
-  BundleSummary take_in_full(BundleResult result);
+  // How often close() has moved the map.
+  std::size_t closings() const { return first_move_ + moves_.size(); }
+
+  // Takes in a bundle adjustment of everything that was made of an earlier snapshot (solve_full),
+  // when the map had been moved by `closings_then` loops: it is carried over those that were closed
+  // since. Keyframes born since follow through the spanning tree, landmarks with their reference
+  // keyframe. Left out is a result that is older than one which was taken in, than the loops that
+  // are remembered, or than one that changed scales.
+  BundleSummary take_in_full(BundleResult result, std::size_t closings_then);
 
   // Bundle adjustment of everything but the origin: solve_full and take_in_full.
   BundleSummary optimize_full(std::stop_token stop = {});
@@ -86,12 +92,17 @@ class Backend {
   void take_in(const LoopClosure& closure, const LoopGraphOptions& options);
   void merge_sides(const LoopMeasurement& loop);
   MapSmoother& smoother();
+  void moved_by_others(bool cameras_too);
+  void forget_moves(std::size_t count);
 
   BackendOptions options_;
   Map map_;
-  std::optional<MapSmoother> smoother_;   // in step with the map; none if that was moved since
+  std::optional<MapSmoother> smoother_;   // in step with the map
   std::vector<LoopMeasurement> refused_;  // oldest first
   std::vector<PoseConstraint> closed_;    // loops, as measured, weighted
+  // What close() did to the map, for results that are still to come: the newest, oldest first.
+  std::vector<LoopMove> moves_;
+  std::size_t first_move_ = 0;  // how many are no longer kept
 };
 
 // Bundle adjustment of everything but the origin, of a snapshot: in any thread.

@@ -7,10 +7,11 @@ namespace hybrid_slam {
 FullBundleWorker::FullBundleWorker(const FullBundleOptions& options, MappingWorker& mapping)
     : options_(options), mapping_(mapping), thread_([this] { work(); }) {}
 
-void FullBundleWorker::adjust(std::shared_ptr<const MapSnapshot> map, int loops_closed) {
+void FullBundleWorker::adjust(std::shared_ptr<const MapSnapshot> map, std::size_t loops_closed) {
+  if (!wants_full_bundle(*map, options_)) {
+    return;
+  }
   requests_.publish(std::make_shared<const Request>(Request{std::move(map), loops_closed}));
-  const std::lock_guard lock(mutex_);
-  current_.request_stop();
 }
 
 void FullBundleWorker::finish(bool give_up) {
@@ -37,8 +38,7 @@ void FullBundleWorker::work() {
         }
         current_ = stop;
       }
-      // A newer request that came before the lock could not stop this one.
-      if (requests_.version() == seen && !solve(*request, stop.get_token())) {
+      if (!solve(*request, stop.get_token())) {
         break;
       }
     }

@@ -19,8 +19,9 @@ class FullBundleWorker {
   FullBundleWorker(const FullBundleOptions& options, MappingWorker& mapping);
   ~FullBundleWorker() { finish(true); }
 
-  // A loop was closed: adjust this map. What is being adjusted is given up. Never waits.
-  void adjust(std::shared_ptr<const MapSnapshot> map, int loops_closed);
+  // A loop was closed: adjust this map, if the options want it for one of this size. What is being
+  // adjusted is completed first; of maps that come meanwhile, the last. Never waits.
+  void adjust(std::shared_ptr<const MapSnapshot> map, std::size_t loops_closed);
 
   // No adjustment begins any more; the present one is completed, or given up.
   void finish(bool give_up);
@@ -37,7 +38,7 @@ class FullBundleWorker {
  private:
   struct Request {
     std::shared_ptr<const MapSnapshot> map;
-    int loops_closed = 0;
+    std::size_t loops_closed = 0;
   };
 
   void work();

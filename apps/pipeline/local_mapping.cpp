@@ -74,19 +74,20 @@ LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
   return outcome;
 }
 
-void LocalMapping::take_in_full(BundleResult result, StageTimes& times,
+void LocalMapping::take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times,
                                 const std::function<void()>& publish) {
   StageClock clock(times);
-  backend_.take_in_full(std::move(result));
+  backend_.take_in_full(std::move(result), closings_then);
   clock.lap("take_in_full_bundle");
   publish();
 }
 
 void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& publish) {
+  if (!wants_full_bundle(backend_.view(), options_.backend.full)) return;
   StageClock clock(times);
   BundleResult result = solve_full(backend_.view(), options_.backend.full);
   clock.lap("full_bundle");
-  take_in_full(std::move(result), times, publish);
+  take_in_full(std::move(result), backend_.closings(), times, publish);
 }
 
 }  // namespace hybrid_slam

@@ -45,10 +45,14 @@ class LocalMapping {
   LoopOutcome close(const LoopMeasurement& loop, StageTimes& times,
                     const std::function<void()>& publish);
 
-  // Takes in what solve_full() made of a snapshot that no loop was closed since.
-  void take_in_full(BundleResult result, StageTimes& times, const std::function<void()>& publish);
+  // How often the map was moved by a loop.
+  std::size_t closings() const { return backend_.closings(); }
 
-  // The same at once.
+  // Takes in what solve_full() made of a snapshot, when that many loops had moved the map.
+  void take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times,
+                    const std::function<void()>& publish);
+
+  // The same at once, if the options want it for a map of this size.
   void adjust_full(StageTimes& times, const std::function<void()>& publish);
 
   std::shared_ptr<const MapSnapshot> snapshot() { return backend_.snapshot(); }

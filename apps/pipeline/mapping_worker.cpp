@@ -53,18 +53,13 @@ void MappingWorker::run(MappingJob& job) {
 
 void MappingWorker::run(LoopMeasurement& loop) {
   const LoopOutcome outcome = mapping_.close(loop, times_, [this] { publish(); });
-  if (outcome.end == LoopEnd::kClosed) {
-    ++loops_closed_;
-  }
-  events_.looped(outcome, snapshots_.get(), loops_closed_);
+  events_.looped(outcome, snapshots_.get(), mapping_.closings());
 }
 
 void MappingWorker::run(FullCorrection& correction) {
-  if (correction.loops_closed != loops_closed_) {
-    return;
-  }
-  mapping_.take_in_full(std::move(correction.result), times_, [this] { publish(); });
-  loops_adjusted_ = loops_closed_;
+  mapping_.take_in_full(std::move(correction.result), correction.loops_closed, times_,
+                        [this] { publish(); });
+  loops_adjusted_ = correction.loops_closed;
 }
 
 }  // namespace hybrid_slam

@@ -15,9 +15,10 @@
 
 namespace hybrid_slam {
 
-// A bundle adjustment of everything, to be taken in unless a loop was closed since its snapshot.
+// A bundle adjustment of everything, to be carried over the loops that were closed since its
+// snapshot.
 struct FullCorrection {
-  int loops_closed = 0;  // when the snapshot was taken
+  std::size_t loops_closed = 0;  // when the snapshot was taken
   BundleResult result;
 };
 
@@ -25,7 +26,8 @@ struct FullCorrection {
 struct MappingEvents {
   std::function<void(KeyframeId, const std::shared_ptr<const MapSnapshot>&)> mapped;
   // With the map after it, and how many loops are closed now.
-  std::function<void(const LoopOutcome&, const std::shared_ptr<const MapSnapshot>&, int)> looped;
+  std::function<void(const LoopOutcome&, const std::shared_ptr<const MapSnapshot>&, std::size_t)>
+      looped;
 };
 
 // The map's owner in a thread of its own. Keyframes, loops and corrections go in, snapshots come
@@ -65,8 +67,7 @@ class MappingWorker {
 
   // After finish().
   const StageTimes& times() const { return times_; }
-  int loops_closed() const { return loops_closed_; }
-  int loops_adjusted() const { return loops_adjusted_; }  // of these, in the last full adjustment
+  std::size_t loops_adjusted() const { return loops_adjusted_; }  // in the last full adjustment
   struct Added {
     CameraKind camera;
     std::int64_t frame_index;
@@ -91,12 +92,11 @@ class MappingWorker {
   Channel<std::variant<MappingJob, LoopMeasurement, FullCorrection>> tasks_;
   Latest<MapSnapshot> snapshots_;
   std::mutex mutex_;
-  std::stop_source current_;      // guarded by mutex_
-  StageTimes times_;              // the thread's own until finish()
-  int loops_closed_ = 0;          // likewise
-  int loops_adjusted_ = 0;        // likewise
-  std::vector<Added> keyframes_;  // likewise
-  std::exception_ptr failure_;    // likewise
+  std::stop_source current_;        // guarded by mutex_
+  StageTimes times_;                // the thread's own until finish()
+  std::size_t loops_adjusted_ = 0;  // likewise
+  std::vector<Added> keyframes_;    // likewise
+  std::exception_ptr failure_;      // likewise
   std::jthread thread_;
 };
 

@@ -79,7 +79,8 @@ class Workers {
       }
     };
     events.looped = [this](const LoopOutcome& outcome,
-                           const std::shared_ptr<const MapSnapshot>& map, int loops_closed) {
+                           const std::shared_ptr<const MapSnapshot>& map,
+                           std::size_t loops_closed) {
       loops_->loop_handled(outcome);
       if (outcome.end == LoopEnd::kClosed) {
         full_bundle_->adjust(map, loops_closed);
@@ -93,11 +94,8 @@ class Workers {
   }
 
   void close_left_loops() {
-    int closed = mapping_.loops_closed();
     const auto close = [&](const LoopMeasurement& loop) {
-      const LoopOutcome outcome = local_mapping_.close(loop, times_, [] {});
-      loop_closing_->closed(outcome);
-      closed += outcome.end == LoopEnd::kClosed ? 1 : 0;
+      loop_closing_->closed(local_mapping_.close(loop, times_, [] {}));
     };
     if (const auto loop = loops_->take_loop()) {
       close(*loop);
@@ -107,10 +105,12 @@ class Workers {
         close(*loop);
       }
     }
-    auto correction = full_bundle_->take_correction();
-    if (correction && correction->loops_closed == closed) {
-      local_mapping_.take_in_full(std::move(correction->result), times_, [] {});
-    } else if (closed > mapping_.loops_adjusted()) {
+    std::size_t adjusted = mapping_.loops_adjusted();
+    if (auto correction = full_bundle_->take_correction()) {
+      adjusted = correction->loops_closed;
+      local_mapping_.take_in_full(std::move(correction->result), adjusted, times_, [] {});
+    }
+    if (local_mapping_.closings() > adjusted) {
       local_mapping_.adjust_full(times_, [] {});
     }
   }

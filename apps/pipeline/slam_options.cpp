@@ -298,7 +298,15 @@ void fields_of(S section, LoopOptions& options) {
 }
 
 template <typename S>
+void fields_of(S section, FullBundleOptions& options) {
+  section.field("enabled", options.enabled)
+      .field("max_keyframes", options.max_keyframes)
+      .refuse_unknown();
+}
+
+template <typename S>
 void fields_of(S section, BackendOptions& options) {
+  fields_of(section.section("full_bundle"), options.full);
   section
       .choice("method",
               {{"incremental", LocalMethod::kIncremental}, {"bundle", LocalMethod::kBundle}},

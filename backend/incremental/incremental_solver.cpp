@@ -236,11 +236,17 @@ std::size_t IncrementalSolver::choose() {
 UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
   UpdateSummary summary;
   credit_ = std::min(credit_ + options_.budget, options_.burst * options_.budget);
-  if (dirty_.empty() && touched_.empty()) summary.relinearized += choose();
+  bool to_solve = !jumped_.empty();
+  if (to_solve) {
+    summary.relinearized += settle_moves();
+  } else if (dirty_.empty() && touched_.empty()) {
+    summary.relinearized += choose();
+  }
   for (int i = 0; i < options_.max_steps; ++i) {
-    if (dirty_.empty() && touched_.empty() && damped_.empty()) break;
+    if (dirty_.empty() && touched_.empty() && damped_.empty() && !to_solve) break;
     summary.stopped = stop.stop_requested();
     if (summary.stopped) break;
+    to_solve = false;
     step(summary);
     if (i + 1 < options_.max_steps) summary.relinearized += choose();
   }

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "backend/incremental/block.h"
@@ -104,6 +105,13 @@ class IncrementalSolver final : private TermSource {
   // Poses and blocks leave the system: what their terms say about others stays, as a linear prior.
   // Landmarks of these poses are minimised out as well, and blocks that ride with them go, too.
   void marginalize(const std::vector<GraphVariable>& variables);
+
+  // The estimate of these poses jumps: a loop was closed, or something else solved them. Points
+  // follow. The next updates begin there: they linearise anew what this took off its linearisation
+  // (terms between poses that moved as one rigid body stay as they are), and take back what the
+  // terms do not agree with. Poses that are fixed, the window's
+  // marginalised ones among them, must not be moved: std::logic_error, and nothing is done.
+  void move_poses(const std::vector<std::pair<std::uint32_t, Rigid3d>>& cam_from_world);
 
   // The covariance of a pose's left perturbation, exp(d) * cam_from_world, given all that was taken
   // in; conditional on what is fixed.
@@ -247,6 +255,7 @@ class IncrementalSolver final : private TermSource {
   void evaluate(std::uint32_t term);
   void check(const std::vector<std::uint32_t>& linearized, const std::vector<std::uint32_t>& moved);
   std::size_t choose();
+  std::size_t settle_moves();
   double typical() const;
 
   // What a step may have to take back.
@@ -315,6 +324,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<std::uint32_t> dirty_;    // terms
   std::vector<std::uint32_t> touched_;  // variables whose terms changed
   std::vector<std::uint32_t> newest_;   // variables
+  std::vector<std::uint32_t> jumped_;   // variables that were moved since the last update
   std::vector<std::uint32_t> pending_;  // terms
   std::uint64_t stamp_ = 0;
   double squared_norm_ = 0;  // of all terms

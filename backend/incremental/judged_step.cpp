@@ -75,11 +75,13 @@ void IncrementalSolver::step(UpdateSummary& summary) {
 // Factors, solves, and measures what that does to the terms: these, and those of what moved.
 void IncrementalSolver::solve_step(UpdateSummary& summary,
                                    const std::vector<std::uint32_t>& terms) {
-  tree_.refactor(touched_, newest_, *this);
-  touched_.clear();
-  summary.poses += tree_.last_poses();
-  summary.multiplications += tree_.last_cost();
-  summary.undetermined = std::max(summary.undetermined, tree_.last_undetermined());
+  if (!touched_.empty()) {
+    tree_.refactor(touched_, newest_, *this);
+    touched_.clear();
+    summary.poses += tree_.last_poses();
+    summary.multiplications += tree_.last_cost();
+    summary.undetermined = std::max(summary.undetermined, tree_.last_undetermined());
+  }
   std::vector<std::uint32_t> moved;
   tree_.solve(options_.wildfire, moved);
   for (const std::uint32_t variable : moved) {

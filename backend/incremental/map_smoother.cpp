@@ -27,6 +27,7 @@ MapSmoother::MapSmoother(const MapSmootherOptions& options)
 
 BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest) {
   const auto start = std::chrono::steady_clock::now();
+  follow_moves(*map);
   take_in_keyframes(*map, newest);
   take_in_loops(*map);
   const std::vector<LandmarkId> changed =
@@ -49,6 +50,24 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
   summary.outliers = static_cast<int>(result.outliers.size());
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
+}
+
+// A loop was closed, or everything adjusted: the map is no longer where the last result left it.
+void MapSmoother::follow_moves(const MapSnapshot& map) {
+  if (known_map_ == nullptr) return;
+  std::vector<std::pair<std::uint32_t, Rigid3d>> moved;
+  for (const KeyframeId id : map.changed_keyframes(*known_map_)) {
+    const Keyframe* keyframe = map.find(id);
+    if (keyframe == nullptr || id.value >= pose_of_.size() || id == map.origin()) continue;
+    const std::uint32_t pose = pose_of_[id.value];
+    if (is_off(*keyframe, solver_.pose(pose))) moved.emplace_back(pose, keyframe->cam_from_world);
+  }
+  if (!moved.empty()) solver_.move_poses(moved);
+}
+
+bool MapSmoother::is_off(const Keyframe& keyframe, const Rigid3d& estimate) const {
+  const auto off = (estimate.params - keyframe.cam_from_world.params).lpNorm<Eigen::Infinity>();
+  return off > options_.min_motion;
 }
 
 // All up to this one, in their order.
@@ -84,12 +103,21 @@ void MapSmoother::take_in_odometry(const MapSnapshot& map) {
   for (const KeyframeId id : changed) take_in_odometry(map, id);
 }
 
+bool MapSmoother::sees_the_same(const MapSnapshot& map, KeyframeId id) const {
+  const Keyframe* before = known_map_->find(id);
+  return before != nullptr && before->landmarks == map.at(id).landmarks;
+}
+
 void MapSmoother::take_in_odometry(const MapSnapshot& map, KeyframeId id) {
   const Keyframe* keyframe = map.find(id);
   const auto odometry = keyframe != nullptr ? keyframe->odometry : nullptr;
   const auto found = odometry_.find(id);
   if (odometry == nullptr && found == odometry_.end()) return;
   KnownOdometry& known = found != odometry_.end() ? found->second : odometry_[id];
+  if (odometry != nullptr && known.odometry == odometry && sees_the_same(map, id) &&
+      sees_the_same(map, odometry->previous)) {
+    return;  // moved, no more
+  }
   const double share = odometry != nullptr ? unshared(map, *keyframe) : 0;
   if (known.odometry == odometry && std::abs(share - known.share) <= kShareTolerance) return;
   known.odometry = odometry;
@@ -170,8 +198,7 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
     const Keyframe* keyframe = map.find(keyframe_of_[pose]);
     if (keyframe == nullptr) continue;
     const Rigid3d estimate = solver_.pose(pose);
-    const auto off = (estimate.params - keyframe->cam_from_world.params).lpNorm<Eigen::Infinity>();
-    if (off <= options_.min_motion) continue;
+    if (!is_off(*keyframe, estimate)) continue;
     result.cam_from_world.emplace_back(keyframe->id, estimate);
     seen.insert(seen.end(), keyframe->landmarks.begin(), keyframe->landmarks.end());
   }

@@ -24,8 +24,9 @@ struct MapSmootherOptions {
 
 // Incremental smoothing of a map that grows: an IncrementalSolver kept in step with it. Each update
 // takes in what changed in the map, whatever it was (keyframes and landmarks that came or went,
-// observations, merged landmarks), at the price of that change. All keyframes but the origin vary,
-// or those of the solver's window. Moving the map by other means asks for a new smoother.
+// observations, merged landmarks, odometry, keyframes that others moved), at the price of that
+// change. All keyframes but the origin vary, or those of the solver's window: with a window, moving
+// the map by other means asks for a new smoother, since what was marginalised cannot follow.
 class MapSmoother {
  public:
   explicit MapSmoother(const MapSmootherOptions& options);
@@ -65,10 +66,13 @@ class MapSmoother {
   };
 
   void take_in_keyframes(const MapSnapshot& map, KeyframeId last);
+  void follow_moves(const MapSnapshot& map);
+  bool is_off(const Keyframe& keyframe, const Rigid3d& estimate) const;
   void take_in_loops(const MapSnapshot& map);
   void take_in_landmark(const MapSnapshot& map, LandmarkId id);
   void take_in_odometry(const MapSnapshot& map);
   void take_in_odometry(const MapSnapshot& map, KeyframeId id);
+  bool sees_the_same(const MapSnapshot& map, KeyframeId id) const;
   std::uint32_t add_observation(const MapSnapshot& map, std::uint32_t point,
                                 const Observation& seen);
   void set_outliers_aside(const MapSnapshot& map, KeyframeId newest, BundleResult& result);

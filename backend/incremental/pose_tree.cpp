@@ -431,6 +431,14 @@ void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
   for (std::size_t i = first; i < changed.size(); ++i) moved_[changed[i]] = 0;
 }
 
+void PoseTree::shift(std::uint32_t pose, const Vector6d& by) {
+  values(delta_, pose) += by;
+  values(sent_, pose) = delta_of(pose);
+  for (std::int32_t i = clique_of_[pose]; i != kNone && !at(i).fresh; i = at(i).parent) {
+    at(i).fresh = true;
+  }
+}
+
 void PoseTree::undo_solve() {
   const double* value = before_.data();
   for (const std::uint32_t variable : solved_variables_) {

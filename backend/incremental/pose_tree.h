@@ -68,6 +68,10 @@ class PoseTree {
   }
   Eigen::Index size(std::uint32_t variable) const { return size_[variable]; }
 
+  // Moves a pose by as much, whatever the system says. The next solve tells what changes against
+  // that.
+  void shift(std::uint32_t pose, const Vector6d& by);
+
   // Of a pose's delta: its block of H^-1. Looks at the pose's clique and those above.
   Matrix6d covariance(std::uint32_t pose) const { return covariance(std::span(&pose, 1)); }
   // Of the deltas of several variables together, in this order; distinct. What is not part of the

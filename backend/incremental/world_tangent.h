@@ -22,6 +22,13 @@ struct WorldTangent {
     return xi;
   }
 
+  // And back.
+  Vector6d increment(const Vector6d& xi) const {
+    Vector6d at_place = xi;
+    at_place.head<3>() -= place.cross(xi.tail<3>());
+    return at_place;
+  }
+
   Rigid3d moved(const Rigid3d& cam_from_world, const Vector6d& increment) const {
     return cam_from_world * se3_exp(at_origin(increment));
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "backend/map/map_snapshot.h"
 #include "backend/problem/problem_config.h"
 
@@ -7,8 +9,15 @@ namespace hybrid_slam {
 
 struct FullBundleOptions {
   ProblemOptions problem{.rounds = {{10, Loss::kHuber, 1e-4}, {20, Loss::kNone, 1e-8}}};
-  bool refine_intrinsics = false;  // of all cameras; a stereo pair keeps its baseline
+  bool enabled = true;               // after a loop was closed
+  std::size_t max_keyframes = 1000;  // of a map that it is done for; larger ones have the smoother
+  bool refine_intrinsics = false;    // of all cameras; a stereo pair keeps its baseline
 };
+
+// Whether everything is to be adjusted after a loop.
+inline bool wants_full_bundle(const MapSnapshot& map, const FullBundleOptions& options) {
+  return options.enabled && map.keyframe_count() <= options.max_keyframes;
+}
 
 // Bundle adjustment of every keyframe but the origin and of every landmark, with the odometry.
 ProblemConfig make_full_bundle(const MapSnapshot& map, const FullBundleOptions& options);

@@ -24,12 +24,18 @@ struct Solved {
   bool usable = false;
 };
 
+// From where the map is, or from the poses of `start`, which was made of the same map.
 Solved solve(const MapSnapshot& map, const std::vector<PoseConstraint>& loops,
-             const std::vector<LoopEnds>& closed, const LoopGraphOptions& options, Loss loss) {
+             const std::vector<LoopEnds>& closed, const LoopGraphOptions& options, Loss loss,
+             const MapGraph* start = nullptr) {
   ProblemConfig config = make_loop_graph(map, loops, options, closed);
   config.options.loop_loss = loss;
   Solved solved;
   solved.made = make_graph(map, config);
+  if (start != nullptr) {
+    solved.made.graph.frames = start->graph.frames;
+    solved.made.graph.similarities = start->graph.similarities;
+  }
   const GraphSummary summary = solve_graph(solved.made.graph, config.options);
   solved.chi2 = 2 * summary.final_cost;
   solved.usable = summary.end == SolveEnd::kConverged || summary.end == SolveEnd::kIterationLimit;
@@ -70,9 +76,10 @@ class Closer {
     if (there_.empty() || there_.back() != newest) return {};
     LoopClosure alone = try_all({newest});
     if (!alone.taken.empty() || there_.size() == 1) return alone;
-    const std::vector<std::size_t> agreeing = agreeing_with_newest();
+    const Solved robust = solve(map_, pick(there_), closed_, options_.graph, Loss::kCauchy);
+    const std::vector<std::size_t> agreeing = agreeing_with_newest(robust);
     if (agreeing.size() < 2) return alone;
-    LoopClosure together = try_all(agreeing);
+    LoopClosure together = try_all(agreeing, &robust.made);  // which begins nearly where it ends
     return together.taken.empty() ? alone : together;
   }
 
@@ -83,8 +90,9 @@ class Closer {
     return picked;
   }
 
-  LoopClosure try_all(const std::vector<std::size_t>& which) const {
-    const Solved solved = solve(map_, pick(which), closed_, options_.graph, Loss::kNone);
+  LoopClosure try_all(const std::vector<std::size_t>& which,
+                      const MapGraph* start = nullptr) const {
+    const Solved solved = solve(map_, pick(which), closed_, options_.graph, Loss::kNone, start);
     LoopClosure closure;
     closure.chi2 = solved.chi2;
     const std::size_t per_loop = options_.graph.with_scale ? 7 : 6;
@@ -97,8 +105,7 @@ class Closer {
   }
 
   // The loops that a robust optimum satisfies, if the newest is one of them.
-  std::vector<std::size_t> agreeing_with_newest() const {
-    const Solved solved = solve(map_, pick(there_), closed_, options_.graph, Loss::kCauchy);
+  std::vector<std::size_t> agreeing_with_newest(const Solved& solved) const {
     const std::vector<double> values = loops_chi2(solved.made.graph);
     std::vector<std::size_t> agreeing;
     for (std::size_t i = 0; i < values.size(); ++i) {

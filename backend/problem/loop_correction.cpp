@@ -64,6 +64,37 @@ void write_loop_correction(const MapSnapshot& map, const MapGraph& solved, Bundl
   }
 }
 
+LoopMove move_of(const MapSnapshot& before, const BundleResult& correction) {
+  LoopMove move;
+  for (const auto& [id, cam_from_new] : correction.cam_from_world) {
+    const Keyframe* keyframe = before.find(id);
+    if (keyframe == nullptr) continue;
+    move.emplace_back(id, inverse(cam_from_new) * keyframe->cam_from_world);
+  }
+  std::sort(move.begin(), move.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  return move;
+}
+
+void carry_over(const LoopMove& move, const MapSnapshot& now, BundleResult& result) {
+  const auto find = [&](KeyframeId id) -> const Rigid3d* {
+    const auto place =
+        std::lower_bound(move.begin(), move.end(), id,
+                         [](const auto& one, KeyframeId key) { return one.first < key; });
+    return place != move.end() && place->first == id ? &place->second : nullptr;
+  };
+  for (auto& [id, cam_from_world] : result.cam_from_world) {
+    if (const Rigid3d* new_from_old = find(id)) {
+      cam_from_world = cam_from_world * inverse(*new_from_old);
+    }
+  }
+  for (auto& [id, point_in_world] : result.point_in_world) {
+    const Landmark* landmark = now.find(id);
+    const Rigid3d* new_from_old = landmark != nullptr ? find(landmark->reference) : nullptr;
+    if (new_from_old != nullptr) point_in_world = *new_from_old * point_in_world;
+  }
+}
+
 void carry_the_rest(const MapSnapshot& now, BundleResult& result) {
   const Carrier carrier(now, result);
   for (const KeyframeId id : now.keyframe_ids()) {

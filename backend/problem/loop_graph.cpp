@@ -33,6 +33,34 @@ class Remembered {
   std::set<std::pair<KeyframeId, KeyframeId>> pairs_;
 };
 
+// What is older than the loops and than all that edges join to what is newer bends with none of
+// them: it hangs on the rest at one place, and a motion of all the rest costs nothing. It is fixed.
+void hold_what_stays(ProblemConfig& config) {
+  KeyframeId oldest;  // end of a loop
+  for (const PoseConstraint& one : config.constraints) {
+    if (!one.loop) continue;
+    const KeyframeId end = std::min(one.a, one.b);
+    oldest = oldest.valid() ? std::min(oldest, end) : end;
+  }
+  if (!oldest.valid()) return;
+  KeyframeId first = oldest;  // that may bend
+  for (const PoseConstraint& one : config.constraints) {
+    const auto [older, newer] = std::minmax(one.a, one.b);
+    if (newer >= oldest) first = std::min(first, older);
+  }
+  const auto begin = config.variable_poses.begin();
+  const auto end = std::lower_bound(begin, config.variable_poses.end(), first);
+  config.fixed_poses.insert(config.fixed_poses.end(), begin, end);
+  config.variable_poses.erase(begin, end);
+  std::sort(config.fixed_poses.begin(), config.fixed_poses.end());
+  const auto is_fixed = [&](KeyframeId id) {
+    return std::binary_search(config.fixed_poses.begin(), config.fixed_poses.end(), id);
+  };
+  std::erase_if(config.constraints, [&](const PoseConstraint& one) {
+    return !one.loop && is_fixed(one.a) && is_fixed(one.b);
+  });
+}
+
 }  // namespace
 
 Matrix7d motion_information(const MapSnapshot& map, KeyframeId a, KeyframeId b,
@@ -77,6 +105,7 @@ ProblemConfig make_loop_graph(const MapSnapshot& map, const std::vector<PoseCons
     loop.loop = true;
     config.constraints.push_back(loop);
   }
+  hold_what_stays(config);
   return config;
 }
 

@@ -126,6 +126,47 @@ TEST_CASE("backend: a loop moves the map, merges its sides and is kept") {
   CHECK(backend.map().check_consistency() == std::vector<std::string>{});
 }
 
+TEST_CASE("backend: an adjustment of everything is carried over a loop that was closed meanwhile") {
+  Backend backend(chain_backend());
+  OpenCircle circle(backend);
+  const auto snapshot = backend.snapshot();
+  BundleResult adjusted = solve_full(*snapshot, {});  // the ends do not know one another
+  const BundleResult as_solved = adjusted;
+  REQUIRE(backend.close(circle.loop()).end == LoopEnd::kClosed);
+  CHECK(backend.closings() == 1);
+  const double closed = circle.worst_error();
+  const auto before = backend.snapshot();
+  backend.take_in_full(std::move(adjusted), 0);
+  CHECK(backend.map().check_consistency() == std::vector<std::string>{});
+  // Each keyframe moves before its place as the adjustment moved it, wherever the loop took it.
+  for (const auto& [id, pose] : as_solved.cam_from_world) {
+    const Rigid3d wanted = pose * inverse(snapshot->at(id).cam_from_world);
+    const Rigid3d got =
+        backend.view().at(id).cam_from_world * inverse(before->at(id).cam_from_world);
+    CHECK((wanted.params - got.params).norm() < 1e-9);
+  }
+  CHECK(circle.worst_error() < 1.2 * closed);  // the loop is not undone
+  CHECK_THROWS_AS(backend.take_in_full({}, 2), std::logic_error);
+  backend.optimize_full();  // of the closed map: an older result is left out from now on
+  const auto newest = backend.snapshot();
+  backend.take_in_full(as_solved, 0);
+  CHECK(newest->changed_keyframes(backend.view()).empty());
+  CHECK(circle.worst_error() < 0.02);
+}
+
+TEST_CASE("backend: everything is adjusted where the options want it") {
+  Backend backend(chain_backend());
+  OpenCircle circle(backend);
+  const std::size_t count = backend.view().keyframe_count();
+  FullBundleOptions options;
+  options.max_keyframes = count;
+  CHECK(wants_full_bundle(backend.view(), options));
+  options.max_keyframes = count - 1;
+  CHECK_FALSE(wants_full_bundle(backend.view(), options));
+  options = {.enabled = false};
+  CHECK_FALSE(wants_full_bundle(backend.view(), options));
+}
+
 TEST_CASE("backend: a loop that is not believed changes nothing") {
   Backend backend(chain_backend());
   OpenCircle circle(backend);

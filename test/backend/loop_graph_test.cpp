@@ -82,6 +82,33 @@ TEST_CASE("loop graph: a loop spreads the drift over the way, landmarks follow")
   }
 }
 
+TEST_CASE("loop graph: what lies before the loop is held, and would not have moved") {
+  FilledMap filled = circle_map();
+  const MapTruth truth = truth_of(filled.map.view());
+  let_drift(filled.map, truth, small_drift(), 1);
+  const MapSnapshot& map = filled.map.view();
+  PoseConstraint loop = measured(truth, 12, 23);
+  const ProblemConfig bounded = make_loop_graph(map, {loop}, chain_options());
+  CHECK(bounded.variable_poses.size() == 13);  // and the one before the loop
+  CHECK(bounded.fixed_poses.size() == 11);
+  ProblemConfig whole = bounded;
+  whole.fixed_poses = {map.origin()};
+  whole.variable_poses = map.keyframe_ids();
+  std::erase(whole.variable_poses, map.origin());
+  whole.constraints = make_loop_graph(map, {}, chain_options()).constraints;
+  whole.constraints.push_back(bounded.constraints.back());
+  const BundleResult small = solve_bundle(map, bounded);
+  const BundleResult large = solve_bundle(map, whole);
+  REQUIRE(small.cam_from_world.size() == 13);
+  REQUIRE(large.cam_from_world.size() == 23);
+  for (std::size_t i = 0; i < 23; ++i) {
+    const auto& [id, pose] = large.cam_from_world[i];
+    const Rigid3d& expected =
+        i < 10 ? map.at(id).cam_from_world : small.cam_from_world[i - 10].second;
+    CHECK((pose.params - expected.params).norm() < 1e-5);
+  }
+}
+
 TEST_CASE("loop graph: drift of scale takes similarities") {
   FilledMap filled = circle_map();
   const MapTruth truth = truth_of(filled.map.view());

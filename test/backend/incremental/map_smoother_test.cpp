@@ -7,6 +7,7 @@
 #include "backend/backend.h"
 #include "backend/problem/odometry_constraints.h"
 #include "backend/problem/solve_graph.h"
+#include "cameras/geometry/so3.h"
 #include "test/support/random_edits.h"
 
 #include <catch2/catch.hpp>
@@ -142,6 +143,39 @@ TEST_CASE("An observation that was set aside and is taken in again is given back
   const BundleResult again = smoother.update(filled.map.snapshot(), filled.keyframes[12]);
   CHECK(again.outliers.size() < result.outliers.size());
   CHECK(observed(smoother.solver().graph()).size() + again.outliers.size() == held);
+}
+
+TEST_CASE("A smoother follows a map that others moved, and takes back what is not right") {
+  SyntheticSceneOptions options;
+  options.times = 24;
+  options.landmarks = 1500;
+  FilledMap filled = fill_map(make_synthetic_scene(options), {});
+  MapSmootherOptions lenient;  // no outliers
+  lenient.solver.chi2_mono = lenient.solver.chi2_stereo = 1e300;
+  MapSmoother smoother(lenient);
+  const auto update = [&](int times) {
+    for (int i = 0; i < times; ++i) {
+      const BundleResult result = smoother.update(filled.map.snapshot(), filled.keyframes.back());
+      filled.map.move(result.cam_from_world, result.point_in_world);
+    }
+  };
+  update(10);
+  const auto settled = filled.map.snapshot();
+  std::vector<std::pair<KeyframeId, Rigid3d>> moves;
+  const Rigid3d by(so3_exp(Eigen::Vector3d(0.02, 0.01, -0.03)), Eigen::Vector3d(0.1, 0.05, -0.05));
+  for (std::size_t i = 8; i < 16; ++i) {
+    const KeyframeId id = filled.keyframes[i];
+    moves.emplace_back(id, settled->at(id).cam_from_world * inverse(by));
+  }
+  filled.map.move(moves, {});
+  update(10);
+  double worst = 0;
+  for (const KeyframeId id : filled.keyframes) {
+    worst = std::max(worst, (filled.map.view().at(id).cam_from_world.params -
+                             settled->at(id).cam_from_world.params)
+                                .norm());
+  }
+  CHECK(worst < 1e-3);
 }
 
 // Grows a map as the pipeline does, from poses and points that are off.
