@@ -48,7 +48,9 @@ IncrementalSolver::Dependence IncrementalSolver::dependence_of(const GraphVariab
     result.by_delta.push_back(std::move(by_carrier));
   } else {
     // d = -L^-T (U^T delta), and V^-1 = L^-T L^-1 around it.
-    const LandmarkTerm& landmark = landmarks_[given.index];
+    const LandmarkTerm landmark = condensed_in_[given.index] != kNone
+                                      ? linearized_landmark(given.index)
+                                      : *landmarks_[given.index];
     if (!landmark.solvable) {
       result.own = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
       return result;

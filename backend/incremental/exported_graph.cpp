@@ -113,15 +113,16 @@ double IncrementalSolver::cost() const {
   for (std::uint32_t i = 0; i < edges_.size(); ++i) {
     if (edge_there_[i] != 0) sum += edge_residual(i).squaredNorm();
   }
+  std::vector<Eigen::Vector3d> points;
   for (std::uint32_t i = 0; i < landmarks_.size(); ++i) {
-    const Eigen::Vector3d at = point(i);
-    for (const LandmarkView& view : landmarks_[i].views) {
-      const Rigid3d cam_from_world = pose_at(view.pose);
-      const double* blocks[] = {cam_from_world.params.data(), at.data()};
-      Eigen::Vector3d residual = Eigen::Vector3d::Zero();
-      if (observation_factors_[view.observation]->Evaluate(blocks, residual.data(), nullptr)) {
-        sum += residual.squaredNorm();
-      }
+    points.push_back(point(i));
+  }
+  for (std::uint32_t i = 0; i < observations_.size(); ++i) {
+    if (observation_there_[i] == 0) continue;
+    Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+    if (reproject(i, pose(observations_[i].frame), points[observations_[i].point],
+                  residual.data())) {
+      sum += residual.squaredNorm();
     }
   }
   Eigen::VectorXd residual;

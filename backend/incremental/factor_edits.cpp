@@ -120,10 +120,17 @@ std::vector<std::uint32_t> IncrementalSolver::all_variables_of_term(std::uint32_
       return priors_[term.index].all.variables;
     case TermKind::kFactor:
       return all_variables(factors_[term.index]);
+    case TermKind::kCondensed: {
+      std::vector<std::uint32_t> all;
+      for (const std::uint32_t observation : condensed_[term.index].observations) {
+        add_once(all, poses_[observations_[observation].frame].variable);
+      }
+      return all;
+    }
     case TermKind::kLandmark:
       break;
   }
-  return all_variables(landmarks_[term.index]);
+  return all_variables(*landmarks_[term.index]);
 }
 
 bool IncrementalSolver::uses(const LandmarkTerm& landmark, std::uint32_t variable) const {
@@ -192,7 +199,7 @@ std::uint32_t IncrementalSolver::add_factor(const GraphFactor& given) {
 // A factor over a point becomes part of the landmark's term.
 void IncrementalSolver::join_landmark(std::uint32_t index) {
   const Factor& factor = factors_[index];
-  LandmarkTerm& landmark = landmarks_[factor.point];
+  LandmarkTerm& landmark = live(factor.point);
   const std::uint32_t term = landmark_terms_[factor.point];
   const std::vector<std::uint32_t> all = all_variables(factor);
   std::vector<std::uint32_t> first;
@@ -212,7 +219,7 @@ void IncrementalSolver::join_landmark(std::uint32_t index) {
 
 void IncrementalSolver::leave_landmark(std::uint32_t index) {
   const Factor& factor = factors_[index];
-  LandmarkTerm& landmark = landmarks_[factor.point];
+  LandmarkTerm& landmark = live(factor.point);
   const std::uint32_t term = landmark_terms_[factor.point];
   mark_dirty(term);
   const std::vector<std::uint32_t> all = all_variables(factor);
@@ -284,7 +291,7 @@ void IncrementalSolver::refresh(std::uint32_t id) {
   } else if (term.kind == TermKind::kPrior) {
     put_fixed_in(priors_[term.index]);
   } else {
-    LandmarkTerm& landmark = landmarks_[term.index];
+    LandmarkTerm& landmark = *landmarks_[term.index];
     std::erase_if(landmark.poses,
                   [&](std::uint32_t v) { return variables_[v].fixed || !contains(all, v); });
     for (const std::uint32_t v : all) {
@@ -328,6 +335,8 @@ void IncrementalSolver::set_fixed(const GraphVariable& given, bool fixed) {
   Variable& variable = variables_[index];
   if (variable.fixed == fixed) return;
   if (variable.gone) refuse_because("variable", given.index, "was marginalised");
+  take_apart(variable.terms);
+  take_apart(variable.dormant);
   std::vector<std::uint32_t> ids = variable.terms;
   ids.insert(ids.end(), variable.mixed.begin(), variable.mixed.end());
   ids.insert(ids.end(), variable.dormant.begin(), variable.dormant.end());

@@ -6,7 +6,6 @@
 
 #include "backend/incremental/incremental_solver.h"
 #include "backend/problem/measurement_fault.h"
-#include "factors/make_reprojection_factor.h"
 #include "factors/relative_pose_factor.h"
 
 // What is added to the graph of an IncrementalSolver, and what is taken out.
@@ -87,36 +86,46 @@ std::uint32_t IncrementalSolver::add_point(const Eigen::Vector3d& in_world) {
   if (!free_points_.empty()) {
     const std::uint32_t index = free_points_.back();
     free_points_.pop_back();
-    landmarks_[index] = std::move(landmark);
+    landmarks_[index] = std::make_unique<LandmarkTerm>(std::move(landmark));
     point_there_[index] = 1;
+    live_points_.push_back(index);
     return index;
   }
-  landmarks_.push_back(std::move(landmark));
+  const auto made = static_cast<std::uint32_t>(landmarks_.size());
+  landmarks_.push_back(std::make_unique<LandmarkTerm>(std::move(landmark)));
   point_there_.push_back(1);
+  condensed_in_.push_back(kNone);
+  live_points_.push_back(made);
   landmark_terms_.push_back(
-      add_term(TermKind::kLandmark, static_cast<std::uint32_t>(landmarks_.size()) - 1));
-  return static_cast<std::uint32_t>(landmarks_.size()) - 1;
+      add_term(TermKind::kLandmark, made));
+  return made;
 }
 
 std::uint32_t IncrementalSolver::add_term(TermKind kind, std::uint32_t index) {
   Term term;
   term.kind = kind;
   term.index = index;
+  if (!free_terms_.empty()) {
+    const std::uint32_t id = free_terms_.back();
+    free_terms_.pop_back();
+    term.step = terms_[id].step;
+    terms_[id] = term;
+    return id;
+  }
   terms_.push_back(term);
   return static_cast<std::uint32_t>(terms_.size()) - 1;
 }
 
 std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observation) {
   Pose& pose = item(poses_, observation.frame, "pose");
-  LandmarkTerm& landmark = item(landmarks_, observation.point, "point");
+  item(landmarks_, observation.point, "point");
   refuse(point_there_[observation.point] != 0 ? nullptr : "was removed", "point");
   const Camera& camera = item(cameras_, pose.camera, "camera");
   refuse(measurement_fault(observation, camera), "observation");
   const std::uint32_t index = free_observation();
   observations_[index] = observation;
   observation_there_[index] = 1;
-  observation_factors_[index] =
-      make_reprojection_factor(camera, observation.measurement, observation.sigma);
+  LandmarkTerm& landmark = live(observation.point);
   LandmarkView view;
   view.observation = index;
   view.pose = pose.variable;
@@ -139,7 +148,6 @@ std::uint32_t IncrementalSolver::free_observation() {
   }
   observations_.emplace_back();
   observation_there_.push_back(0);
-  observation_factors_.emplace_back();
   return static_cast<std::uint32_t>(observations_.size()) - 1;
 }
 
@@ -166,12 +174,11 @@ std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
 
 void IncrementalSolver::remove_observation(std::uint32_t observation) {
   if (item(observation_there_, observation, "observation") == 0) return;
-  observation_there_[observation] = 0;
   const GraphObservation& removed = observations_[observation];
-  LandmarkTerm& landmark = landmarks_[removed.point];
+  LandmarkTerm& landmark = live(removed.point);
+  observation_there_[observation] = 0;
   const std::uint32_t term = landmark_terms_[removed.point];
   mark_dirty(term);  // before: its former poses are touched too
-  observation_factors_[observation].reset();
   free_observations_.push_back(observation);
   std::erase_if(landmark.views,
                 [&](const LandmarkView& view) { return view.observation == observation; });
@@ -183,8 +190,9 @@ void IncrementalSolver::remove_observation(std::uint32_t observation) {
 }
 
 void IncrementalSolver::remove_point(std::uint32_t point) {
-  const LandmarkTerm& landmark = item(landmarks_, point, "point");
+  item(landmarks_, point, "point");
   if (point_there_[point] == 0) return;
+  const LandmarkTerm& landmark = live(point);
   point_there_[point] = 0;
   while (!landmark.views.empty()) remove_observation(landmark.views.back().observation);
   while (!landmark.factors.empty()) remove_factor(landmark.factors.back().factor);

@@ -27,6 +27,7 @@ std::string IncrementalOptions::validate() const {
   if (!(relinearization > 0)) return "relinearization must be positive";
   if (!(worst_mismatch > 0)) return "worst_mismatch must be positive";
   if (window < 0) return "window must not be negative";
+  if (condense_after < 0) return "condense_after must not be negative";
   if (!(burst >= 1)) return "burst must be at least 1";
   if (!(wildfire >= 0)) return "wildfire must not be negative";
   if (!(block_wildfire >= 0)) return "block_wildfire must not be negative";
@@ -67,10 +68,12 @@ std::span<const std::uint32_t> IncrementalSolver::poses_of(std::uint32_t term) c
       return priors_[t.index].active.variables;
     case TermKind::kFactor:
       return factor_terms_[t.index].variables;
+    case TermKind::kCondensed:
+      return condensed_[t.index].poses;
     case TermKind::kLandmark:
       break;
   }
-  return landmarks_[t.index].poses;
+  return landmarks_[t.index]->poses;
 }
 
 void IncrementalSolver::assemble(std::uint32_t term, Front& front) const {
@@ -83,7 +86,9 @@ void IncrementalSolver::assemble(std::uint32_t term, Front& front) const {
     case TermKind::kFactor:
       return factor_terms_[t.index].assemble(front);
     case TermKind::kLandmark:
-      return landmarks_[t.index].assemble(front);
+      return landmarks_[t.index]->assemble(front);
+    case TermKind::kCondensed:
+      return condensed_[t.index].assemble(front);
   }
 }
 
@@ -117,7 +122,8 @@ Eigen::VectorXd IncrementalSolver::block(std::uint32_t index) const {
 }
 
 Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
-  const LandmarkTerm& landmark = landmarks_.at(index);
+  if (condensed_in_.at(index) != kNone) return condensed_point(index);
+  const LandmarkTerm& landmark = *landmarks_[index];
   Eigen::Vector3d at = carried_base(landmark);
   if (!landmark.solvable) return at;
   at += displacement(landmark);
@@ -257,6 +263,7 @@ UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
   if (!summary.stopped) {
     newest_.clear();
     summary.marginalized = slide_window();
+    condense_old();
   }
   summary.pending = pending_.size();
   return summary;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "backend/incremental/block.h"
+#include "backend/incremental/condensed_term.h"
 #include "backend/incremental/edge_term.h"
 #include "backend/incremental/landmark_term.h"
 #include "backend/incremental/pose_tree.h"
@@ -49,6 +50,10 @@ struct IncrementalOptions {
   // move. A landmark that is seen again afterwards starts anew. What is left of a pose is about 300
   // bytes, of a landmark nothing once remove_point() was called. 0: all poses stay.
   int window = 0;
+  // Landmarks that none of so many newest poses sees are condensed: what they say about the poses
+  // that saw them stays as it was linearised, as one term for many of them (CondensedTerm), until
+  // one of them changes or these poses move against one another. Nothing is lost. 0: never.
+  int condense_after = 30;
 
   std::string validate() const;
 };
@@ -143,7 +148,7 @@ class IncrementalSolver final : private TermSource {
   double cost() const;
 
  private:
-  enum class TermKind : std::uint8_t { kEdge, kLandmark, kPrior, kFactor };
+  enum class TermKind : std::uint8_t { kEdge, kLandmark, kPrior, kFactor, kCondensed };
 
   struct Term {
     TermKind kind = TermKind::kEdge;
@@ -224,7 +229,13 @@ class IncrementalSolver final : private TermSource {
   // These return the term's cost.
   double linearize_edge(std::uint32_t index);
   double linearize_landmark(std::uint32_t index);
+  double linearize(LandmarkTerm& landmark, const Eigen::Vector3d& at) const;
   bool linearize_view(const Eigen::Vector3d& point, LandmarkView& view, double& cost) const;
+  // The residual of an observation, and its derivatives where they are not null.
+  bool reproject(std::uint32_t observation, const Rigid3d& cam_from_world,
+                 const Eigen::Vector3d& point, double* residual, double* d_pose = nullptr,
+                 double* d_point = nullptr) const;
+  int rows_of_observation(std::uint32_t observation) const;
   // A term's residual at the present estimate.
   struct Evaluation {
     double squared_norm = 0;      // of what the linearisation predicts: weighted
@@ -249,6 +260,7 @@ class IncrementalSolver final : private TermSource {
   Evaluation evaluate_edge(std::uint32_t index) const;
   Evaluation evaluate_landmark(std::uint32_t index) const;
   Evaluation evaluate_prior(std::uint32_t index) const;
+  Evaluation evaluate_condensed(std::uint32_t index) const;
   Evaluation evaluate_rows(std::uint32_t factor) const;
   void evaluate_factor_view(const FactorView& view, const Eigen::Vector3d& at,
                             const Eigen::Vector3d& displacement, Evaluation& result) const;
@@ -278,11 +290,27 @@ class IncrementalSolver final : private TermSource {
   void raise_damping();
   void relax_damping();
 
+  // backend/incremental/condensation.cpp
+  void condense_old();
+  bool is_old(std::uint32_t point, std::uint32_t recent);
+  void condense(const std::vector<std::uint32_t>& points, const std::vector<std::uint32_t>& poses);
+  void take_apart(std::uint32_t index);
+  void take_apart(const std::vector<std::uint32_t>& terms);
+  LandmarkTerm& live(std::uint32_t point);
+  double linearize_condensed(std::uint32_t index);
+  Eigen::VectorXd deltas_of(const std::vector<std::uint32_t>& poses) const;
+  std::vector<double> shape_change(const CondensedTerm& term) const;
+  LandmarkTerm taken_out(const CondensedTerm& term, std::size_t member) const;
+  std::size_t member_of(std::uint32_t point) const;
+  LandmarkTerm linearized_landmark(std::uint32_t point) const;
+  Eigen::Vector3d condensed_point(std::uint32_t point) const;
+
   LinearSystem rows_of_term(std::uint32_t term) const;
   LinearSystem rows_of(const LandmarkTerm& landmark) const;
   void marginalize_variables(const std::vector<std::uint32_t>& variables);
   void add_prior(RowsTerm prior);
   void drop_term(std::uint32_t term);
+  void forget_sums(std::uint32_t term);
   std::vector<std::uint32_t> slide_window();
   GraphPrior exported(const RowsTerm& prior) const;
   Pose& pose_with(std::uint32_t variable) { return poses_[variables_[variable].index]; }
@@ -303,10 +331,16 @@ class IncrementalSolver final : private TermSource {
   std::vector<Term> terms_;
   std::vector<GraphObservation> observations_;
   std::vector<char> observation_there_;
-  std::vector<std::unique_ptr<ceres::CostFunction>> observation_factors_;
-  std::vector<LandmarkTerm> landmarks_;
+  std::vector<std::unique_ptr<LandmarkTerm>> landmarks_;  // none of those that are condensed
   std::vector<char> point_there_;
   std::vector<std::uint32_t> landmark_terms_;  // the term of a landmark
+  std::vector<std::uint32_t> condensed_in_;    // the condensed term that has it, or kNone
+  std::vector<std::uint32_t> live_points_;     // that may not be condensed
+  std::vector<CondensedTerm> condensed_;
+  std::vector<std::uint32_t> condensed_ids_;  // the term of each
+  std::vector<std::uint32_t> free_condensed_;
+  std::vector<std::uint32_t> free_terms_;
+  std::size_t next_condensation_ = 0;  // at so many poses
   std::vector<GraphEdge> edges_;
   std::vector<char> edge_there_;
   std::vector<std::unique_ptr<ceres::CostFunction>> edge_factors_;

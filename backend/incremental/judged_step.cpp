@@ -67,7 +67,7 @@ void IncrementalSolver::step(UpdateSummary& summary) {
   moved_blocks_.clear();
   for (const std::uint32_t landmark : held_back_) {
     // What was displaced by a part will be displaced further. The others wait for a change.
-    if (!displacement(landmarks_[landmark]).isZero(0)) mark_dirty(landmark_terms_[landmark]);
+    if (!displacement(*landmarks_[landmark]).isZero(0)) mark_dirty(landmark_terms_[landmark]);
   }
   held_back_.clear();
 }
@@ -112,7 +112,7 @@ void IncrementalSolver::undo_step() {
   }
   moved_.clear();
   moved_blocks_.clear();
-  for (const std::uint32_t landmark : held_back_) landmarks_[landmark].held_back.setZero();
+  for (const std::uint32_t landmark : held_back_) landmarks_[landmark]->held_back.setZero();
   held_back_.clear();
 }
 
@@ -133,7 +133,7 @@ void IncrementalSolver::hold_landmarks_back() {
   for (const std::uint32_t id : std::vector<std::uint32_t>(judged_)) {
     const Term& term = terms_[id];
     if (term.kind != TermKind::kLandmark || !(term.cost > term.start_cost)) continue;
-    LandmarkTerm& landmark = landmarks_[term.index];
+    LandmarkTerm& landmark = *landmarks_[term.index];
     if (!landmark.solvable) continue;
     const Eigen::Vector3d full = displacement(landmark);
     double best_cost = term.cost;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "backend/incremental/incremental_solver.h"
+#include "factors/camera_reprojection.h"
 
 // What an IncrementalSolver asks its terms: their linearisation at the present estimate, and how
 // far the present estimate is from it.
@@ -30,6 +31,8 @@ void IncrementalSolver::linearize(std::uint32_t term) {
     t.cost = linearize_landmark(t.index);
   } else if (t.kind == TermKind::kFactor) {
     t.cost = linearize_rows(t.index);
+  } else if (t.kind == TermKind::kCondensed) {
+    t.cost = linearize_condensed(t.index);
   }
 }
 
@@ -38,7 +41,7 @@ RobustLoss IncrementalSolver::edge_loss(std::uint32_t index) const {
 }
 
 RobustLoss IncrementalSolver::view_loss(const LandmarkView& view) const {
-  const bool stereo = observation_factors_[view.observation]->num_residuals() == 3;
+  const bool stereo = rows_of_observation(view.observation) == 3;
   return {options_.loss, stereo ? options_.chi2_stereo : options_.chi2_mono};
 }
 
@@ -71,18 +74,32 @@ double IncrementalSolver::linearize_edge(std::uint32_t index) {
   return loss.cost(squared);
 }
 
+bool IncrementalSolver::reproject(std::uint32_t observation, const Rigid3d& cam_from_world,
+                                  const Eigen::Vector3d& point, double* residual, double* d_pose,
+                                  double* d_point) const {
+  const GraphObservation& seen = observations_[observation];
+  return camera_reprojection_residual(cameras_[poses_[seen.frame].camera],
+                                      cam_from_world.params.data(), point.data(), seen.measurement,
+                                      seen.sigma, residual, d_pose, d_point);
+}
+
+int IncrementalSolver::rows_of_observation(std::uint32_t observation) const {
+  const GraphObservation& seen = observations_[observation];
+  return reprojection_rows(cameras_[poses_[seen.frame].camera], seen.measurement);
+}
+
 bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkView& view,
                                        double& cost) const {
-  const ceres::CostFunction& factor = *observation_factors_[view.observation];
   const Rigid3d cam_from_world = pose_at(view.pose);
-  const double* blocks[] = {cam_from_world.params.data(), point.data()};
   Eigen::Matrix<double, 3, 7, Eigen::RowMajor> by_pose;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
   by_pose.row(2).setZero();
   by_point.row(2).setZero();
   view.residual.setZero();
-  double* jacobians[] = {by_pose.data(), by_point.data()};
-  if (!factor.Evaluate(blocks, view.residual.data(), jacobians)) return false;
+  if (!reproject(view.observation, cam_from_world, point, view.residual.data(), by_pose.data(),
+                 by_point.data())) {
+    return false;
+  }
   const RobustLoss loss = view_loss(view);
   const double squared = view.residual.squaredNorm();
   cost += loss.cost(squared);
@@ -98,9 +115,13 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
 }
 
 double IncrementalSolver::linearize_landmark(std::uint32_t index) {
-  LandmarkTerm& landmark = landmarks_[index];
+  return linearize(*landmarks_[index], point(index));
+}
+
+// Of a landmark that need not be part of the graph. `wanted`: where, if that is possible.
+double IncrementalSolver::linearize(LandmarkTerm& landmark, const Eigen::Vector3d& wanted) const {
   const Eigen::Vector3d start = carried_base(landmark);
-  Eigen::Vector3d step = point(index) - start;
+  Eigen::Vector3d step = wanted - start;
   if (!step.allFinite()) step.setZero();
   std::vector<LandmarkView> views = landmark.views;
   std::vector<FactorView> factors = landmark.factors;
@@ -170,7 +191,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_edge(std::uint32_t ind
 }
 
 IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t index) const {
-  const LandmarkTerm& landmark = landmarks_[index];
+  const LandmarkTerm& landmark = *landmarks_[index];
   Evaluation result;
   if (!landmark.solvable) return result;
   const Eigen::Vector3d at = point(index);
@@ -178,11 +199,9 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
   for (const LandmarkView& view : landmark.views) {
     if (!view.usable) continue;
     const Rigid3d cam_from_world = pose_at(view.pose);
-    const double* blocks[] = {cam_from_world.params.data(), at.data()};
-    const ceres::CostFunction& factor = *observation_factors_[view.observation];
     Eigen::Vector3d residual = Eigen::Vector3d::Zero();
-    result.rows += factor.num_residuals();
-    if (!factor.Evaluate(blocks, residual.data(), nullptr)) {
+    result.rows += rows_of_observation(view.observation);
+    if (!reproject(view.observation, cam_from_world, at, residual.data())) {
       result.squared_mismatch += kFarOff;
       result.cost += kFarOff;
       continue;
@@ -205,12 +224,8 @@ double IncrementalSolver::chi2(std::uint32_t observation) const {
     throw std::logic_error("IncrementalSolver::chi2: no such observation");
   }
   const GraphObservation& seen = observations_[observation];
-  const ceres::CostFunction& factor = *observation_factors_[observation];
-  const Rigid3d cam_from_world = pose(seen.frame);
-  const Eigen::Vector3d at = point(seen.point);
-  const double* blocks[] = {cam_from_world.params.data(), at.data()};
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
-  if (!factor.Evaluate(blocks, residual.data(), nullptr)) {
+  if (!reproject(observation, pose(seen.frame), point(seen.point), residual.data())) {
     return std::numeric_limits<double>::infinity();
   }
   return residual.squaredNorm();
@@ -223,6 +238,7 @@ void IncrementalSolver::evaluate(std::uint32_t id) {
   if (term.kind == TermKind::kLandmark) at = evaluate_landmark(term.index);
   if (term.kind == TermKind::kPrior) at = evaluate_prior(term.index);
   if (term.kind == TermKind::kFactor) at = evaluate_rows(term.index);
+  if (term.kind == TermKind::kCondensed) at = evaluate_condensed(term.index);
   if (!std::isfinite(at.cost) || !std::isfinite(at.squared_mismatch)) {
     at = {0, kFarOff, kFarOff, at.rows};
   }

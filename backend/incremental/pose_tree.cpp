@@ -431,6 +431,37 @@ void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
   for (std::size_t i = first; i < changed.size(); ++i) moved_[changed[i]] = 0;
 }
 
+std::vector<std::int32_t> PoseTree::depths() const {
+  std::vector<std::int32_t> depths(cliques_.size(), kNone);
+  std::vector<std::int32_t> way;
+  for (std::size_t i = 0; i < cliques_.size(); ++i) {
+    if (cliques_[i].frontals.empty()) continue;
+    auto clique = static_cast<std::int32_t>(i);
+    for (; clique != kNone && depths[static_cast<std::size_t>(clique)] == kNone;
+         clique = at(clique).parent) {
+      way.push_back(clique);
+    }
+    std::int32_t depth = clique == kNone ? 0 : depths[static_cast<std::size_t>(clique)] + 1;
+    for (; !way.empty(); way.pop_back()) depths[static_cast<std::size_t>(way.back())] = depth++;
+  }
+  return depths;
+}
+
+std::int32_t PoseTree::clique_of(std::span<const std::uint32_t> variables,
+                                 const std::vector<std::int32_t>& depths) const {
+  std::int32_t deepest = kNone;
+  std::int32_t depth = kNone;
+  for (const std::uint32_t variable : variables) {
+    const std::int32_t clique = clique_of_[variable];
+    if (clique == kNone) return kNone;
+    if (depths[static_cast<std::size_t>(clique)] > depth) {
+      depth = depths[static_cast<std::size_t>(clique)];
+      deepest = clique;
+    }
+  }
+  return deepest;
+}
+
 void PoseTree::shift(std::uint32_t pose, const Vector6d& by) {
   values(delta_, pose) += by;
   values(sent_, pose) = delta_of(pose);

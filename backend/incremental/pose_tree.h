@@ -78,6 +78,12 @@ class PoseTree {
   // system has zeros.
   Eigen::MatrixXd covariance(std::span<const std::uint32_t> variables) const;
 
+  // By clique: how many are above it.
+  std::vector<std::int32_t> depths() const;
+  // The clique that eliminates the first of these variables, all of one term; none: negative.
+  std::int32_t clique_of(std::span<const std::uint32_t> variables,
+                         const std::vector<std::int32_t>& depths) const;
+
   std::size_t clique_count() const { return cliques_.size() - free_.size(); }
   double last_cost() const { return last_cost_; }  // of the last refactor, in multiplications
   std::size_t last_poses() const { return last_poses_; }

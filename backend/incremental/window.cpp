@@ -90,12 +90,14 @@ LinearSystem IncrementalSolver::rows_of_term(std::uint32_t id) const {
     case TermKind::kEdge:
       return rows_of_edge(edge_terms_[term.index]);
     case TermKind::kLandmark:
-      return rows_of(landmarks_[term.index]);
+      return rows_of(*landmarks_[term.index]);
     case TermKind::kFactor: {
       const RowsTerm& rows = factor_terms_[term.index];
       if (rows.rows.residual.size() > 0) return rows.rows;
       return {Eigen::MatrixXd(0, rows.offsets.back()), Eigen::VectorXd(0)};
     }
+    case TermKind::kCondensed:
+      throw std::logic_error("IncrementalSolver::rows_of_term: a condensed term has none");
     case TermKind::kPrior:
       break;
   }
@@ -115,6 +117,7 @@ void IncrementalSolver::marginalize_variables(const std::vector<std::uint32_t>& 
     }
   }
   const std::vector<std::uint32_t> leaving = columns.variables();
+  for (const std::uint32_t variable : leaving) take_apart(variables_[variable].terms);
   const Eigen::Index leaving_columns = columns.count();
   std::vector<std::uint32_t> ids;
   for (const std::uint32_t variable : leaving) {
@@ -175,17 +178,23 @@ void IncrementalSolver::add_prior(RowsTerm rows) {
   terms_[id].cost = evaluate_prior(terms_[id].index).cost;
 }
 
+// What a term adds to the sums over all is no longer there.
+void IncrementalSolver::forget_sums(std::uint32_t id) {
+  Term& term = terms_[id];
+  squared_norm_ -= term.squared_norm;
+  rows_ -= term.rows;
+  mismatch_ -= term.mismatch;
+  term.squared_norm = term.mismatch = term.cost = 0;
+  term.rows = 0;
+}
+
 // The term's information has gone elsewhere. A landmark stays where it is, as if newly made.
 void IncrementalSolver::drop_term(std::uint32_t id) {
   Term& term = terms_[id];
   const auto varying = poses_of(id);
   touched_.insert(touched_.end(), varying.begin(), varying.end());
   for (const std::uint32_t variable : all_variables_of_term(id)) unlink(variable, id);
-  squared_norm_ -= term.squared_norm;
-  rows_ -= term.rows;
-  mismatch_ -= term.mismatch;
-  term.squared_norm = term.mismatch = term.cost = 0;
-  term.rows = 0;
+  forget_sums(id);
   const auto forget_factor = [this](std::uint32_t factor) {
     factors_[factor].there = false;
     factors_[factor].function.reset();
@@ -201,11 +210,13 @@ void IncrementalSolver::drop_term(std::uint32_t id) {
   } else if (term.kind == TermKind::kFactor) {
     factor_terms_[term.index] = {};
     forget_factor(term.index);
+  } else if (term.kind == TermKind::kCondensed) {
+    free_condensed_.push_back(term.index);
+    condensed_[term.index] = {};
   } else {
-    LandmarkTerm& landmark = landmarks_[term.index];
+    LandmarkTerm& landmark = *landmarks_[term.index];
     for (const LandmarkView& view : landmark.views) {
       observation_there_[view.observation] = 0;
-      observation_factors_[view.observation].reset();
       free_observations_.push_back(view.observation);
     }
     for (const FactorView& view : landmark.factors) forget_factor(view.factor);

@@ -1,0 +1,292 @@
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <tuple>
+#include <utility>
+
+#include "backend/incremental/incremental_solver.h"
+
+// How an IncrementalSolver condenses what it has not seen for a while, and takes it apart again.
+
+namespace hybrid_slam {
+
+namespace {
+
+// Poses of a condensed term, of which it keeps a dense matrix.
+constexpr std::size_t kMostPoses = 16;
+
+// Condensed landmarks keep their place before their anchor while the poses that see them have not
+// moved against one another by more than this, in standard deviations of an observation.
+constexpr double kStill = 0.05;
+
+}  // namespace
+
+// The deltas of a condensed term's poses now.
+Eigen::VectorXd IncrementalSolver::deltas_of(const std::vector<std::uint32_t>& poses) const {
+  Eigen::VectorXd deltas(static_cast<Eigen::Index>(6 * poses.size()));
+  Eigen::Index row = 0;
+  for (const std::uint32_t pose : poses) {
+    deltas.segment<6>(row) = tree_.delta(pose);
+    row += 6;
+  }
+  return deltas;
+}
+
+// How far a view of each pose is, in standard deviations of an observation, from what it would be
+// if the poses had moved together since the term was made. A turn by t moves what is seen by
+// |derivative| t, and by a part t of that in second order; a way counts by the turn that it looks
+// like.
+std::vector<double> IncrementalSolver::shape_change(const CondensedTerm& term) const {
+  std::vector<double> change;
+  Vector6d common = Vector6d::Zero();
+  for (std::size_t i = 0; i < term.poses.size(); ++i) {
+    const WorldTangent& tangent = pose_with(term.poses[i]).tangent;
+    const Vector6d moved =
+        tree_.delta(term.poses[i]) - term.at.segment<6>(static_cast<Eigen::Index>(6 * i));
+    const Vector6d xi = tangent.at_origin(moved);
+    if (i == 0 && !term.is_held) common = xi;
+    const Vector6d own = tangent.increment(xi - common);
+    const CondensedTerm::Reach& reach = term.reach[i];
+    const double views = std::max(reach.views, 1);
+    change.push_back(own.tail<3>().norm() * std::sqrt(reach.by_turn / views) +
+                     own.head<3>().norm() * std::sqrt(reach.by_way / views));
+  }
+  return change;
+}
+
+IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_t index) const {
+  const CondensedTerm& term = condensed_[index];
+  Evaluation result;
+  if (term.members.empty()) return result;
+  const Eigen::VectorXd moved = deltas_of(term.poses) - term.at;
+  result.squared_norm =
+      std::max(term.squared_norm + moved.dot(2 * term.gradient + term.times(moved)), 0.0);
+  result.cost = std::max(result.squared_norm + term.loss_excess, 0.0);
+  result.rows = term.rows;
+  const std::vector<double> change = shape_change(term);
+  for (std::size_t i = 0; i < change.size(); ++i) {
+    const CondensedTerm::Reach& reach = term.reach[i];
+    if (reach.by_turn > 0) {
+      result.squared_mismatch +=
+          std::pow(change[i], 4) * reach.views * reach.views / reach.by_turn;
+    }
+  }
+  return result;
+}
+
+// A member as a term of its own, not linearised.
+LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t member) const {
+  const CondensedTerm::Member& of = term.members[member];
+  LandmarkTerm landmark;
+  landmark.base = inverse(pose_at(of.anchor)) * of.in_anchor;
+  const std::size_t end = member + 1 < term.members.size() ? term.members[member + 1].first
+                                                           : term.observations.size();
+  for (std::size_t k = of.first; k < end; ++k) {
+    LandmarkView view;
+    view.observation = term.observations[k];
+    view.pose = poses_[observations_[view.observation].frame].variable;
+    view.fixed = variables_[view.pose].fixed;
+    if (!view.fixed && std::find(landmark.poses.begin(), landmark.poses.end(), view.pose) ==
+                           landmark.poses.end()) {
+      landmark.poses.push_back(view.pose);
+    }
+    landmark.views.push_back(view);
+  }
+  return landmark;
+}
+
+std::size_t IncrementalSolver::member_of(std::uint32_t point) const {
+  const std::vector<CondensedTerm::Member>& members = condensed_[condensed_in_[point]].members;
+  return static_cast<std::size_t>(
+      std::find_if(members.begin(), members.end(),
+                   [&](const CondensedTerm::Member& of) { return of.landmark == point; }) -
+      members.begin());
+}
+
+// A landmark by itself, linearised at the present estimate, wherever it is kept.
+LandmarkTerm IncrementalSolver::linearized_landmark(std::uint32_t point) const {
+  LandmarkTerm landmark = taken_out(condensed_[condensed_in_[point]], member_of(point));
+  linearize(landmark, landmark.base);
+  return landmark;
+}
+
+Eigen::Vector3d IncrementalSolver::condensed_point(std::uint32_t point) const {
+  const CondensedTerm& term = condensed_[condensed_in_[point]];
+  const CondensedTerm::Member& of = term.members[member_of(point)];
+  const std::vector<double> change = shape_change(term);
+  if (std::none_of(change.begin(), change.end(), [](double by) { return by > kStill; })) {
+    return inverse(pose_at(of.anchor)) * of.in_anchor;
+  }
+  const LandmarkTerm landmark = linearized_landmark(point);
+  if (!landmark.solvable) return landmark.base;
+  return landmark.base + displacement(landmark);
+}
+
+// Makes a condensed term anew from its observations.
+double IncrementalSolver::linearize_condensed(std::uint32_t index) {
+  CondensedTerm& term = condensed_[index];
+  const std::vector<std::uint32_t> poses = term.poses;
+  std::vector<LandmarkTerm> landmarks;
+  std::vector<double> costs;
+  for (std::size_t i = 0; i < term.members.size(); ++i) {
+    landmarks.push_back(taken_out(term, i));
+    LandmarkTerm& landmark = landmarks.back();
+    linearize(landmark, landmark.base);
+    if (landmark.solvable) {  // where it is best with its poses where they are
+      costs.push_back(linearize(landmark, landmark.base + displacement(landmark)));
+    } else {
+      costs.push_back(0);
+    }
+  }
+  term.begin(poses, deltas_of(poses));
+  double cost = 0;
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    term.add(landmarks[i], costs[i]);
+    cost += costs[i];
+    CondensedTerm::Member& of = term.members[i];
+    of.in_anchor = pose_at(of.anchor) * landmarks[i].base;
+  }
+  return cost;
+}
+
+// Its landmarks become terms of their own.
+void IncrementalSolver::take_apart(std::uint32_t index) {
+  const std::uint32_t id = condensed_ids_[index];
+  std::vector<LandmarkTerm> landmarks;
+  for (std::size_t i = 0; i < condensed_[index].members.size(); ++i) {
+    landmarks.push_back(taken_out(condensed_[index], i));
+  }
+  const CondensedTerm term = condensed_[index];
+  drop_term(id);
+  if (terms_[id].pending) std::erase(pending_, id);
+  if (terms_[id].dirty) std::erase(dirty_, id);
+  free_terms_.push_back(id);
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const std::uint32_t point = term.members[i].landmark;
+    condensed_in_[point] = kNone;
+    landmarks_[point] = std::make_unique<LandmarkTerm>(std::move(landmarks[i]));
+    landmark_terms_[point] = add_term(TermKind::kLandmark, point);
+    for (const std::uint32_t v : all_variables(*landmarks_[point])) link(v, landmark_terms_[point]);
+    mark_dirty(landmark_terms_[point]);
+    live_points_.push_back(point);
+  }
+}
+
+// Those of these terms that are condensed.
+void IncrementalSolver::take_apart(const std::vector<std::uint32_t>& terms) {
+  for (const std::uint32_t id : std::vector<std::uint32_t>(terms)) {
+    if (terms_[id].kind == TermKind::kCondensed) take_apart(terms_[id].index);
+  }
+}
+
+// Takes apart what a landmark is condensed in, if it is.
+LandmarkTerm& IncrementalSolver::live(std::uint32_t point) {
+  if (condensed_in_[point] != kNone) take_apart(condensed_in_[point]);
+  return *landmarks_[point];
+}
+
+// Whether a landmark may be condensed: no recent pose sees it, and it is linearised where it is.
+// One that waits for that has waited long enough.
+bool IncrementalSolver::is_old(std::uint32_t point, std::uint32_t recent) {
+  const LandmarkTerm& landmark = *landmarks_[point];
+  Term& term = terms_[landmark_terms_[point]];
+  if (term.dirty || !landmark.solvable || !landmark.factors.empty() || landmark.poses.empty() ||
+      landmark.poses.size() > kMostPoses || !landmark.held_back.isZero(0)) {
+    return false;
+  }
+  for (const LandmarkView& view : landmark.views) {
+    if (!view.usable || variables_[view.pose].index >= recent) return false;
+  }
+  if (term.pending) mark_dirty(landmark_terms_[point]);
+  return !term.pending;
+}
+
+// Condenses landmarks that one clique of the tree holds: so what is factored stays as it is.
+void IncrementalSolver::condense_old() {
+  const auto keep = static_cast<std::size_t>(options_.condense_after);
+  if (keep == 0 || poses_.size() < next_condensation_ || !touched_.empty()) return;
+  next_condensation_ = poses_.size() + std::max<std::size_t>(1, keep / 4);
+  if (poses_.size() <= keep) return;
+  const auto recent = static_cast<std::uint32_t>(poses_.size() - keep);
+  const std::vector<std::int32_t> depths = tree_.depths();
+  struct Candidate {
+    std::int32_t clique;
+    std::vector<std::uint32_t> poses;
+    std::uint32_t point;
+  };
+  std::vector<Candidate> candidates;
+  std::erase_if(live_points_, [&](std::uint32_t point) {
+    return point_there_[point] == 0 || condensed_in_[point] != kNone;
+  });
+  std::sort(live_points_.begin(), live_points_.end());
+  live_points_.erase(std::unique(live_points_.begin(), live_points_.end()), live_points_.end());
+  for (const std::uint32_t point : live_points_) {
+    if (!is_old(point, recent)) continue;
+    std::vector<std::uint32_t> poses = landmarks_[point]->poses;
+    std::sort(poses.begin(), poses.end());
+    const std::int32_t clique = tree_.clique_of(poses, depths);
+    if (clique >= 0) candidates.push_back({clique, std::move(poses), point});
+  }
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return std::tie(a.clique, a.poses, a.point) < std::tie(b.clique, b.poses, b.point);
+  });
+  std::vector<std::uint32_t> points;
+  std::vector<std::uint32_t> poses;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate& next = candidates[i];
+    std::vector<std::uint32_t> united;
+    std::set_union(poses.begin(), poses.end(), next.poses.begin(), next.poses.end(),
+                   std::back_inserter(united));
+    if (!points.empty() &&
+        (united.size() > kMostPoses || candidates[i - 1].clique != next.clique)) {
+      condense(points, poses);
+      points.clear();
+      united = next.poses;
+    }
+    points.push_back(next.point);
+    poses = std::move(united);
+  }
+  if (!points.empty()) condense(points, poses);
+}
+
+void IncrementalSolver::condense(const std::vector<std::uint32_t>& points,
+                                 const std::vector<std::uint32_t>& poses) {
+  CondensedTerm made;
+  made.begin(poses, deltas_of(poses));
+  for (const std::uint32_t point : points) {
+    const std::uint32_t id = landmark_terms_[point];
+    const LandmarkTerm& landmark = *landmarks_[point];
+    CondensedTerm::Member member;
+    member.landmark = point;
+    member.first = static_cast<std::uint32_t>(made.observations.size());
+    member.anchor = landmark.poses.front();
+    member.in_anchor = pose_at(member.anchor) * this->point(point);
+    made.members.push_back(member);
+    for (const LandmarkView& view : landmark.views) made.observations.push_back(view.observation);
+    made.add(landmark, terms_[id].cost);
+    for (const std::uint32_t v : all_variables(landmark)) unlink(v, id);
+    forget_sums(id);
+    landmarks_[point].reset();
+    landmark_terms_[point] = kNone;
+    free_terms_.push_back(id);
+  }
+  std::uint32_t index = 0;
+  if (free_condensed_.empty()) {
+    index = static_cast<std::uint32_t>(condensed_.size());
+    condensed_.emplace_back();
+    condensed_ids_.push_back(kNone);
+  } else {
+    index = free_condensed_.back();
+    free_condensed_.pop_back();
+  }
+  made.members.shrink_to_fit();
+  made.observations.shrink_to_fit();
+  condensed_[index] = std::move(made);
+  const std::uint32_t id = add_term(TermKind::kCondensed, index);
+  condensed_ids_[index] = id;
+  for (const std::uint32_t point : points) condensed_in_[point] = index;
+  for (const std::uint32_t v : all_variables_of_term(id)) link(v, id);
+  evaluate(id);
+}
+
+}  // namespace hybrid_slam

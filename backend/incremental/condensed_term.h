@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "backend/incremental/landmark_term.h"
+
+namespace hybrid_slam {
+
+class Front;
+
+// Landmarks that no pose has seen for a while, as one term on the poses that saw them: the sum of
+// their LandmarkTerms, each with its landmark eliminated. With the deltas d of its poses it is worth
+//   squared_norm + 2 gradient^T (d - at) + (d - at)^T H (d - at).
+// It takes the place of its landmarks' linearisations, in a small part of their memory and time. It
+// is a cache: the observations are still there, and it is made anew from them where its poses have
+// changed their shape, and taken apart where one of its landmarks changes.
+struct CondensedTerm {
+  struct Member {
+    std::uint32_t landmark = 0;
+    std::uint32_t first = 0;   // of its observations; the next member's first is behind the last
+    std::uint32_t anchor = 0;  // a pose's variable that carries the point along
+    Eigen::Vector3d in_anchor = Eigen::Vector3d::Zero();
+  };
+
+  // What a view says about its pose, in squares, summed up: by a turn [1/rad^2], by a way [1/m^2].
+  struct Reach {
+    double by_turn = 0;
+    double by_way = 0;
+    int views = 0;
+  };
+
+  std::vector<Member> members;
+  std::vector<std::uint32_t> observations;
+  std::vector<std::uint32_t> poses;  // that vary
+  bool is_held = false;              // by a view of a fixed pose
+  std::vector<double> information;   // H: blocks (i, j) with j <= i, 6 x 6, one after the other
+  Eigen::VectorXd gradient;          // at `at`
+  Eigen::VectorXd at;                // the poses' deltas when it was made
+  double squared_norm = 0;           // likewise: of the weighted residuals
+  double loss_excess = 0;            // what the losses make of that, beyond it
+  int rows = 0;
+  std::vector<Reach> reach;  // by pose
+
+  // Empties what sums up, for these poses with these deltas.
+  void begin(std::vector<std::uint32_t> poses, Eigen::VectorXd deltas);
+
+  // Adds a landmark's linearisation. `cost`: twice, with its losses, there.
+  void add(const LandmarkTerm& landmark, double cost);
+
+  // H v.
+  Eigen::VectorXd times(const Eigen::VectorXd& v) const;
+
+  void assemble(Front& front) const;
+
+ private:
+  std::size_t slot(std::uint32_t pose) const;
+  Eigen::Map<Matrix6d> block(std::size_t i, std::size_t j);
+  Eigen::Map<const Matrix6d> block(std::size_t i, std::size_t j) const;
+};
+
+}  // namespace hybrid_slam
