@@ -69,7 +69,7 @@ double PoseTree::cost_of(std::span<const std::uint32_t> poses, std::vector<char>
       char& mark = marked[static_cast<std::size_t>(i)];
       if (mark != 0) break;
       mark = 1;
-      cost += factor_cost(at(i).factor.cols(), at(i).contribution.cols());
+      cost += factor_cost(at(i).factor.cols(), at(i).separator_rows());
     }
   }
   return cost;
@@ -230,12 +230,51 @@ void PoseTree::refactor(const std::vector<std::uint32_t>& touched,
   last_cost_ = 0;
   last_poses_ = poses.size();
   last_undetermined_ = 0;
+  for (const std::int32_t orphan : orphans) restore_contribution(orphan, terms);
   for (std::size_t i = made.size(); i-- > 0;) factor(made[i], own[i], terms);
+  for (const std::int32_t orphan : orphans) forget_contributions(at(orphan).children);
+}
+
+// Terms that have one of the clique's frontals and nothing that is eliminated below it.
+std::vector<std::uint32_t> PoseTree::own_terms(const Clique& clique,
+                                               const TermSource& terms) const {
+  std::vector<std::uint32_t> members = clique.frontals;
+  members.insert(members.end(), clique.separator.begin(), clique.separator.end());
+  std::sort(members.begin(), members.end());
+  std::vector<std::uint32_t> own;
+  for (const std::uint32_t pose : clique.frontals) {
+    for (const std::uint32_t term : terms.terms_of(pose)) {
+      const auto poses = terms.poses_of(term);
+      if (std::all_of(poses.begin(), poses.end(), [&](std::uint32_t one) {
+            return std::binary_search(members.begin(), members.end(), one);
+          })) {
+        own.push_back(term);
+      }
+    }
+  }
+  sort_unique(own);
+  return own;
+}
+
+// The clique's terms and all below are what they were when it was factored.
+void PoseTree::restore_contribution(std::int32_t index, const TermSource& terms) {
+  if (at(index).contribution.cols() == at(index).separator_rows()) return;
+  for (const std::int32_t child : at(index).children) restore_contribution(child, terms);
+  const bool fresh = at(index).fresh;
+  factor(index, own_terms(at(index), terms), terms);
+  at(index).fresh = fresh;
+  forget_contributions(at(index).children);
+}
+
+void PoseTree::forget_contributions(const std::vector<std::int32_t>& children) {
+  for (const std::int32_t child : children) {
+    if (at(child).height % options_.levels_kept != 0) at(child).contribution.resize(0, 0);
+  }
 }
 
 void PoseTree::add_contribution(const Clique& child, Front& front) const {
   const std::size_t count = child.separator.size();
-  const Eigen::Index rows = child.contribution.cols();
+  const Eigen::Index rows = child.separator_rows();
   Eigen::Index column = 0;
   for (std::size_t j = 0; j < count; ++j) {
     const std::uint32_t slot_j = front.slot(child.separator[j]);
@@ -337,6 +376,10 @@ void PoseTree::factor(std::int32_t index, const std::vector<std::uint32_t>& own,
   for (const std::uint32_t term : own) terms.assemble(term, front);
   for (const std::int32_t child : clique.children) add_contribution(at(child), front);
   damp(clique, front);
+  clique.height = 0;
+  for (const std::int32_t child : clique.children) {
+    clique.height = std::max(clique.height, at(child).height + 1);
+  }
 
   Eigen::MatrixXd& matrix = front.matrix();
   clique.factor = matrix.leftCols(f);
@@ -375,7 +418,7 @@ bool PoseTree::has_changed(const Clique& clique, std::uint32_t variable, Eigen::
 
 void PoseTree::solve_clique(Clique& clique, double threshold, std::vector<std::uint32_t>& changed) {
   const Eigen::Index f = clique.factor.cols();
-  const Eigen::Index s = clique.contribution.cols();
+  const Eigen::Index s = clique.separator_rows();
   Eigen::VectorXd right = -clique.factor.row(f + s).transpose();
   if (s > 0) {
     Eigen::VectorXd separator(s);

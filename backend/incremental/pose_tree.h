@@ -20,6 +20,10 @@ class PoseTree {
  public:
   struct Options {
     std::size_t max_padding = 2;  // blocks of zeros in a clique, for fewer cliques
+    // What a clique hands to its parent is most of the tree's memory, and needed only where the
+    // parent is factored anew. Away from there one in so many levels keeps it, and what lies
+    // between is factored again when it is asked for.
+    int levels_kept = 8;
     // How firmly a direction is held that no term determines: see refactor().
     double hold = 1e-9;
     // A variable that is no pose has changed once it moved by this share of its standard deviation
@@ -98,11 +102,14 @@ class PoseTree {
     std::vector<std::uint32_t> frontals;
     std::vector<std::uint32_t> separator;
     Eigen::MatrixXd factor;        // (f + s + 1) x f: [L11; L21; y^T], in rows of the tangents
-    Eigen::MatrixXd contribution;  // (s + 1) x s: what it hands to its parent
+    Eigen::MatrixXd contribution;  // (s + 1) x s: what it hands to its parent; or not kept
     Eigen::VectorXd scale;         // s: Front::add_scale of what it hands on
     std::int32_t parent = kNone;
     std::vector<std::int32_t> children;
+    int height = 0;     // cliques below it, on the longest way down
     bool fresh = true;  // factored since it was last solved
+
+    Eigen::Index separator_rows() const { return scale.size(); }
   };
 
   Eigen::Index rows_of(const std::vector<std::uint32_t>& variables) const {
@@ -130,6 +137,9 @@ class PoseTree {
                                           const std::vector<std::uint32_t>& newest,
                                           const TermSource& terms);
   void factor(std::int32_t index, const std::vector<std::uint32_t>& own, const TermSource& terms);
+  std::vector<std::uint32_t> own_terms(const Clique& clique, const TermSource& terms) const;
+  void restore_contribution(std::int32_t index, const TermSource& terms);
+  void forget_contributions(const std::vector<std::int32_t>& children);
   void add_contribution(const Clique& child, Front& front) const;
   void damp(const Clique& clique, Front& front) const;
   void factor_frontals(Clique& clique, Front& front);

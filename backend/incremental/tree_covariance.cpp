@@ -79,7 +79,7 @@ Eigen::MatrixXd PoseTree::covariance(std::span<const std::uint32_t> variables) c
   for (const std::int32_t i : cliques) {
     const Clique& clique = at(i);
     const Eigen::Index f = clique.factor.cols();
-    const Eigen::Index s = clique.contribution.cols();
+    const Eigen::Index s = clique.separator_rows();
     Eigen::MatrixXd solved = columns.gather(clique.frontals, f);
     clique.factor.topRows(f).triangularView<Eigen::Lower>().solveInPlace(solved);
     columns.scatter(clique.frontals, solved);
@@ -91,7 +91,7 @@ Eigen::MatrixXd PoseTree::covariance(std::span<const std::uint32_t> variables) c
   for (std::size_t k = cliques.size(); k-- > 0;) {
     const Clique& clique = at(cliques[k]);
     const Eigen::Index f = clique.factor.cols();
-    const Eigen::Index s = clique.contribution.cols();
+    const Eigen::Index s = clique.separator_rows();
     Eigen::MatrixXd right = columns.gather(clique.frontals, f);
     if (s > 0) {
       right.noalias() -=
