@@ -232,7 +232,7 @@ void PoseTree::refactor(const std::vector<std::uint32_t>& touched,
   last_undetermined_ = 0;
   for (const std::int32_t orphan : orphans) restore_contribution(orphan, terms);
   for (std::size_t i = made.size(); i-- > 0;) factor(made[i], own[i], terms);
-  for (const std::int32_t orphan : orphans) forget_contributions(at(orphan).children);
+  for (const std::int32_t orphan : orphans) settle(orphan);
 }
 
 // Terms that have one of the clique's frontals and nothing that is eliminated below it.
@@ -263,11 +263,20 @@ void PoseTree::restore_contribution(std::int32_t index, const TermSource& terms)
   const bool fresh = at(index).fresh;
   factor(index, own_terms(at(index), terms), terms);
   at(index).fresh = fresh;
-  forget_contributions(at(index).children);
+  if (at(index).settled) forget_contributions(at(index));
 }
 
-void PoseTree::forget_contributions(const std::vector<std::int32_t>& children) {
-  for (const std::int32_t child : children) {
+// What is below a clique that was left as it is will not be factored soon.
+void PoseTree::settle(std::int32_t index) {
+  if (at(index).settled) return;
+  at(index).settled = true;
+  forget_contributions(at(index));
+  for (const std::int32_t child : at(index).children) settle(child);
+}
+
+// Of its children.
+void PoseTree::forget_contributions(const Clique& clique) {
+  for (const std::int32_t child : clique.children) {
     if (at(child).height % options_.levels_kept != 0) at(child).contribution.resize(0, 0);
   }
 }

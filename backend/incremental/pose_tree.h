@@ -106,8 +106,9 @@ class PoseTree {
     Eigen::VectorXd scale;         // s: Front::add_scale of what it hands on
     std::int32_t parent = kNone;
     std::vector<std::int32_t> children;
-    int height = 0;     // cliques below it, on the longest way down
-    bool fresh = true;  // factored since it was last solved
+    int height = 0;        // cliques below it, on the longest way down
+    bool fresh = true;     // factored since it was last solved
+    bool settled = false;  // those below it keep what they hand on in one level of some
 
     Eigen::Index separator_rows() const { return scale.size(); }
   };
@@ -139,7 +140,8 @@ class PoseTree {
   void factor(std::int32_t index, const std::vector<std::uint32_t>& own, const TermSource& terms);
   std::vector<std::uint32_t> own_terms(const Clique& clique, const TermSource& terms) const;
   void restore_contribution(std::int32_t index, const TermSource& terms);
-  void forget_contributions(const std::vector<std::int32_t>& children);
+  void settle(std::int32_t index);
+  void forget_contributions(const Clique& clique);
   void add_contribution(const Clique& child, Front& front) const;
   void damp(const Clique& clique, Front& front) const;
   void factor_frontals(Clique& clique, Front& front);
