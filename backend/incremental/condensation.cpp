@@ -158,6 +158,7 @@ void IncrementalSolver::take_apart(std::uint32_t index) {
   }
   const CondensedTerm term = condensed_[index];
   drop_term(id);
+  condensed_count_ -= landmarks.size();
   if (terms_[id].pending) std::erase(pending_, id);
   if (terms_[id].dirty) std::erase(dirty_, id);
   free_terms_.push_back(id);
@@ -285,6 +286,7 @@ void IncrementalSolver::condense(const std::vector<std::uint32_t>& points,
   const std::uint32_t id = add_term(TermKind::kCondensed, index);
   condensed_ids_[index] = id;
   for (const std::uint32_t point : points) condensed_in_[point] = index;
+  condensed_count_ += points.size();
   for (const std::uint32_t v : all_variables_of_term(id)) link(v, id);
   evaluate(id);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <stop_token>
 #include <utility>
@@ -135,6 +136,7 @@ class IncrementalSolver final : private TermSource {
   Eigen::Vector3d point(std::uint32_t index) const;
   Eigen::VectorXd block(std::uint32_t index) const;
   std::size_t pose_count() const { return poses_.size(); }
+  std::size_t condensed_count() const { return condensed_count_; }  // points
 
   // Squared whitened residual of an observation that is there, at the present estimate; infinite if
   // the point does not project.
@@ -329,7 +331,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<Camera> cameras_;
   std::vector<Pose> poses_;
   std::vector<Term> terms_;
-  std::vector<GraphObservation> observations_;
+  std::deque<GraphObservation> observations_;  // grows without being copied
   std::vector<char> observation_there_;
   std::vector<std::unique_ptr<LandmarkTerm>> landmarks_;  // none of those that are condensed
   std::vector<char> point_there_;
@@ -341,6 +343,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<std::uint32_t> free_condensed_;
   std::vector<std::uint32_t> free_terms_;
   std::size_t next_condensation_ = 0;  // at so many poses
+  std::size_t condensed_count_ = 0;    // points
   std::vector<GraphEdge> edges_;
   std::vector<char> edge_there_;
   std::vector<std::unique_ptr<ceres::CostFunction>> edge_factors_;

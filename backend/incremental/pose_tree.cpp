@@ -277,7 +277,7 @@ void PoseTree::settle(std::int32_t index) {
 // Of its children.
 void PoseTree::forget_contributions(const Clique& clique) {
   for (const std::int32_t child : clique.children) {
-    if (at(child).height % options_.levels_kept != 0) at(child).contribution.resize(0, 0);
+    if ((at(child).height + 1) % options_.levels_kept != 0) at(child).contribution.resize(0, 0);
   }
 }
 

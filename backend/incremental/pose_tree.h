@@ -23,7 +23,7 @@ class PoseTree {
     // What a clique hands to its parent is most of the tree's memory, and needed only where the
     // parent is factored anew. Away from there one in so many levels keeps it, and what lies
     // between is factored again when it is asked for.
-    int levels_kept = 8;
+    int levels_kept = 32;
     // How firmly a direction is held that no term determines: see refactor().
     double hold = 1e-9;
     // A variable that is no pose has changed once it moved by this share of its standard deviation
