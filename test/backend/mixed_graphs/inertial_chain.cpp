@@ -13,8 +13,8 @@ namespace hybrid_slam {
 
 namespace {
 
-constexpr double kStep = 0.1;  // [s]
-constexpr double kRadius = 5;  // [m]
+constexpr double kSampleTime = 0.1;  // [s]
+constexpr double kRadius = 5;        // [m]
 
 // At a moment: on the circle, looking along it, swaying.
 Rigid3d true_pose(double angle) {
@@ -45,8 +45,8 @@ std::vector<Eigen::VectorXd> blocks_of(const std::vector<Rigid3d>& truth) {
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const std::size_t j = std::min(i, truth.size() - 2);
     Eigen::VectorXd block(9);
-    block << (inverse(truth[j + 1]).translation() - inverse(truth[j]).translation()) / kStep, 0.02,
-        -0.01, 0.03, 0.1, -0.05, 0.2;
+    block << (inverse(truth[j + 1]).translation() - inverse(truth[j]).translation()) / kSampleTime,
+        0.02, -0.01, 0.03, 0.1, -0.05, 0.2;
     blocks.push_back(block);
   }
   return blocks;
@@ -78,16 +78,16 @@ InertialChain inertial_chain(const InertialChainOptions& options) {
     const Rigid3d& a = chain.truth[i - 1];
     const Rigid3d& b = chain.truth[i];
     InertialError error_of;
-    error_of.dt = kStep;
+    error_of.dt = kSampleTime;
     const Eigen::VectorXd& x_a = chain.true_blocks[i - 1];
     const Eigen::Vector3d turn =
-        kStep * x_a.segment<3>(3) + random.gaussian3(options.noise * error_of.sigma_turn);
+        kSampleTime * x_a.segment<3>(3) + random.gaussian3(options.noise * error_of.sigma_turn);
     error_of.b_from_a =
         (b * inverse(a)).rotation() *
         Eigen::Quaterniond(1, -turn.x() / 2, -turn.y() / 2, -turn.z() / 2).normalized();
     const Eigen::Vector3d change = chain.true_blocks[i].head<3>() - x_a.head<3>();
-    error_of.acceleration = a.rotation() * Eigen::Vector3d(change / kStep) + x_a.tail<3>() +
-                            random.gaussian3(options.noise * error_of.sigma_velocity / kStep);
+    error_of.acceleration = a.rotation() * Eigen::Vector3d(change / kSampleTime) + x_a.tail<3>() +
+                            random.gaussian3(options.noise * error_of.sigma_velocity / kSampleTime);
     graph.factors.push_back(
         {inertial_factor(error_of),
          {pose_variable(i - 1), pose_variable(i), block_variable(i - 1), block_variable(i)}});
