@@ -52,6 +52,17 @@ std::vector<Eigen::VectorXd> blocks_of(const std::vector<Rigid3d>& truth) {
   return blocks;
 }
 
+// Lets velocities differ from the way that is gone, and biases walk.
+void disturb_blocks(std::vector<Eigen::VectorXd>& blocks, Random& random) {
+  const InertialError weighed;
+  Vector6d walk = Vector6d::Zero();
+  for (Eigen::VectorXd& block : blocks) {
+    block.head<3>() += random.gaussian3(weighed.sigma_place / kSampleTime);
+    block.tail<6>() += walk;
+    for (double& value : walk) value += weighed.sigma_bias * random.gaussian();
+  }
+}
+
 }  // namespace
 
 InertialChain inertial_chain(const InertialChainOptions& options) {
@@ -63,6 +74,8 @@ InertialChain inertial_chain(const InertialChainOptions& options) {
     chain.truth.push_back(true_pose(2 * std::numbers::pi * options.laps * i / count));
   }
   chain.true_blocks = blocks_of(chain.truth);
+  Random random_truth(options.seed + 1000);
+  if (options.consistent) disturb_blocks(chain.true_blocks, random_truth);
   const auto lap = static_cast<std::uint32_t>(count / options.laps);
   for (std::uint32_t i = 0; i < count; ++i) {
     Vector6d error;
@@ -98,10 +111,19 @@ InertialChain inertial_chain(const InertialChainOptions& options) {
     }
   }
   if (options.anchor) {
-    const Matrix6d information = 1e6 * Matrix6d::Identity();
+    constexpr double kPoseSigma = 1e-3;
+    constexpr double kBlockSigma = 0.05;
+    Vector6d pose_error = Vector6d::Zero();
+    Eigen::VectorXd block = chain.true_blocks[0];
+    if (options.consistent) {
+      pose_error << random_truth.gaussian3(kPoseSigma), random_truth.gaussian3(kPoseSigma);
+      for (double& value : block) value += kBlockSigma * random_truth.gaussian();
+    }
+    const Matrix6d information = Matrix6d::Identity() / (kPoseSigma * kPoseSigma);
     graph.factors.push_back(
-        {std::make_shared<PosePrior>(chain.truth[0], information), {pose_variable(0)}});
-    graph.factors.push_back({value_factor<9>(chain.true_blocks[0], 0.05), {block_variable(0)}});
+        {std::make_shared<PosePrior>(se3_exp(pose_error) * chain.truth[0], information),
+         {pose_variable(0)}});
+    graph.factors.push_back({value_factor<9>(block, kBlockSigma), {block_variable(0)}});
   }
   for (int k = 0; k < options.ranges; ++k) {
     const Eigen::Vector3d place = 3 * random.direction();
