@@ -438,7 +438,30 @@ void PoseTree::solve_clique(Clique& clique, double threshold, std::vector<std::u
     }
     right.noalias() -= clique.factor.middleRows(f, s).transpose() * separator;
   }
-  clique.factor.topRows(f).triangularView<Eigen::Lower>().transpose().solveInPlace(right);
+  // What is shared stays where it is until that is worth telling all others, and they are solved
+  // for with it there: those in this clique, too, or the motion would reach everything by them.
+  Eigen::Index rest = f;
+  for (std::size_t i = clique.frontals.size(); i-- > 0 && is_shared(clique.frontals[i]);) {
+    const std::uint32_t variable = clique.frontals[i];
+    const Eigen::Index first = rest - size(variable);
+    auto value = right.segment(first, rest - first);
+    clique.factor.block(first, first, rest - first, rest - first)
+        .triangularView<Eigen::Lower>()
+        .transpose()
+        .solveInPlace(value);
+    const Eigen::VectorXd before = delta_of(variable);
+    values(delta_, variable) = value;
+    if (!has_changed(clique, variable, first, threshold)) value = before;
+    values(delta_, variable) = before;
+    right.head(first).noalias() -=
+        clique.factor.block(first, 0, rest - first, first).transpose() * value;
+    rest = first;
+  }
+  auto others = right.head(rest);
+  clique.factor.topLeftCorner(rest, rest)
+      .triangularView<Eigen::Lower>()
+      .transpose()
+      .solveInPlace(others);
   const bool finite = right.allFinite();
   Eigen::Index row = 0;
   for (const std::uint32_t pose : clique.frontals) {

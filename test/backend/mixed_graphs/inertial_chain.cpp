@@ -13,8 +13,8 @@ namespace hybrid_slam {
 
 namespace {
 
-constexpr double kStep = 0.1;  // [s]
-constexpr double kRadius = 5;  // [m]
+constexpr double kSampleTime = 0.1;  // [s]
+constexpr double kRadius = 5;        // [m]
 
 // At a moment: on the circle, looking along it, swaying.
 Rigid3d true_pose(double angle) {
@@ -45,11 +45,22 @@ std::vector<Eigen::VectorXd> blocks_of(const std::vector<Rigid3d>& truth) {
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const std::size_t j = std::min(i, truth.size() - 2);
     Eigen::VectorXd block(9);
-    block << (inverse(truth[j + 1]).translation() - inverse(truth[j]).translation()) / kStep, 0.02,
-        -0.01, 0.03, 0.1, -0.05, 0.2;
+    block << (inverse(truth[j + 1]).translation() - inverse(truth[j]).translation()) / kSampleTime,
+        0.02, -0.01, 0.03, 0.1, -0.05, 0.2;
     blocks.push_back(block);
   }
   return blocks;
+}
+
+// Lets velocities differ from the way that is gone, and biases walk.
+void disturb_blocks(std::vector<Eigen::VectorXd>& blocks, Random& random) {
+  const InertialError weighed;
+  Vector6d walk = Vector6d::Zero();
+  for (Eigen::VectorXd& block : blocks) {
+    block.head<3>() += random.gaussian3(weighed.sigma_place / kSampleTime);
+    block.tail<6>() += walk;
+    for (double& value : walk) value += weighed.sigma_bias * random.gaussian();
+  }
 }
 
 }  // namespace
@@ -63,6 +74,8 @@ InertialChain inertial_chain(const InertialChainOptions& options) {
     chain.truth.push_back(true_pose(2 * std::numbers::pi * options.laps * i / count));
   }
   chain.true_blocks = blocks_of(chain.truth);
+  Random random_truth(options.seed + 1000);
+  if (options.consistent) disturb_blocks(chain.true_blocks, random_truth);
   const auto lap = static_cast<std::uint32_t>(count / options.laps);
   for (std::uint32_t i = 0; i < count; ++i) {
     Vector6d error;
@@ -78,16 +91,16 @@ InertialChain inertial_chain(const InertialChainOptions& options) {
     const Rigid3d& a = chain.truth[i - 1];
     const Rigid3d& b = chain.truth[i];
     InertialError error_of;
-    error_of.dt = kStep;
+    error_of.dt = kSampleTime;
     const Eigen::VectorXd& x_a = chain.true_blocks[i - 1];
     const Eigen::Vector3d turn =
-        kStep * x_a.segment<3>(3) + random.gaussian3(options.noise * error_of.sigma_turn);
+        kSampleTime * x_a.segment<3>(3) + random.gaussian3(options.noise * error_of.sigma_turn);
     error_of.b_from_a =
         (b * inverse(a)).rotation() *
         Eigen::Quaterniond(1, -turn.x() / 2, -turn.y() / 2, -turn.z() / 2).normalized();
     const Eigen::Vector3d change = chain.true_blocks[i].head<3>() - x_a.head<3>();
-    error_of.acceleration = a.rotation() * Eigen::Vector3d(change / kStep) + x_a.tail<3>() +
-                            random.gaussian3(options.noise * error_of.sigma_velocity / kStep);
+    error_of.acceleration = a.rotation() * Eigen::Vector3d(change / kSampleTime) + x_a.tail<3>() +
+                            random.gaussian3(options.noise * error_of.sigma_velocity / kSampleTime);
     graph.factors.push_back(
         {inertial_factor(error_of),
          {pose_variable(i - 1), pose_variable(i), block_variable(i - 1), block_variable(i)}});
@@ -98,10 +111,19 @@ InertialChain inertial_chain(const InertialChainOptions& options) {
     }
   }
   if (options.anchor) {
-    const Matrix6d information = 1e6 * Matrix6d::Identity();
+    constexpr double kPoseSigma = 1e-3;
+    constexpr double kBlockSigma = 0.05;
+    Vector6d pose_error = Vector6d::Zero();
+    Eigen::VectorXd block = chain.true_blocks[0];
+    if (options.consistent) {
+      pose_error << random_truth.gaussian3(kPoseSigma), random_truth.gaussian3(kPoseSigma);
+      for (double& value : block) value += kBlockSigma * random_truth.gaussian();
+    }
+    const Matrix6d information = Matrix6d::Identity() / (kPoseSigma * kPoseSigma);
     graph.factors.push_back(
-        {std::make_shared<PosePrior>(chain.truth[0], information), {pose_variable(0)}});
-    graph.factors.push_back({value_factor<9>(chain.true_blocks[0], 0.05), {block_variable(0)}});
+        {std::make_shared<PosePrior>(se3_exp(pose_error) * chain.truth[0], information),
+         {pose_variable(0)}});
+    graph.factors.push_back({value_factor<9>(block, kBlockSigma), {block_variable(0)}});
   }
   for (int k = 0; k < options.ranges; ++k) {
     const Eigen::Vector3d place = 3 * random.direction();

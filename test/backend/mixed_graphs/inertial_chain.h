@@ -26,6 +26,8 @@ struct InertialChainOptions {
   bool loops = true;   // edges to a lap before
   bool anchor = true;  // a prior holds the first pose
   double noise = 1;    // of the measurements, in parts of what they are weighed by
+  // Whether all else has the noise that it is weighed by, too: priors, places, the biases' walk.
+  bool consistent = false;
   std::uint64_t seed = 1;
 };
 
