@@ -67,8 +67,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_
   for (std::size_t i = 0; i < change.size(); ++i) {
     const CondensedTerm::Reach& reach = term.reach[i];
     if (reach.by_turn > 0) {
-      result.squared_mismatch +=
-          std::pow(change[i], 4) * reach.views * reach.views / reach.by_turn;
+      result.squared_mismatch += std::pow(change[i], 4) * reach.views * reach.views / reach.by_turn;
     }
   }
   return result;
@@ -79,8 +78,8 @@ LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t
   const CondensedTerm::Member& of = term.members[member];
   LandmarkTerm landmark;
   landmark.base = inverse(pose_at(of.anchor)) * of.in_anchor;
-  const std::size_t end = member + 1 < term.members.size() ? term.members[member + 1].first
-                                                           : term.observations.size();
+  const std::size_t end =
+      member + 1 < term.members.size() ? term.members[member + 1].first : term.observations.size();
   for (std::size_t k = of.first; k < end; ++k) {
     LandmarkView view;
     view.observation = term.observations[k];

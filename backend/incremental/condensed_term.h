@@ -10,7 +10,8 @@ namespace hybrid_slam {
 class Front;
 
 // Landmarks that no pose has seen for a while, as one term on the poses that saw them: the sum of
-// their LandmarkTerms, each with its landmark eliminated. With the deltas d of its poses it is worth
+// their LandmarkTerms, each with its landmark eliminated. With the deltas d of its poses it is
+// worth
 //   squared_norm + 2 gradient^T (d - at) + (d - at)^T H (d - at).
 // It takes the place of its landmarks' linearisations, in a small part of their memory and time. It
 // is a cache: the observations are still there, and it is made anew from them where its poses have

@@ -96,8 +96,7 @@ std::uint32_t IncrementalSolver::add_point(const Eigen::Vector3d& in_world) {
   point_there_.push_back(1);
   condensed_in_.push_back(kNone);
   live_points_.push_back(made);
-  landmark_terms_.push_back(
-      add_term(TermKind::kLandmark, made));
+  landmark_terms_.push_back(add_term(TermKind::kLandmark, made));
   return made;
 }
 

@@ -31,10 +31,10 @@ int run(int keyframes, int window, bool compare) {
   LawnMowerOptions options;
   options.keyframes = keyframes;
   FactorGraph graph = lawn_mower_graph(options);
-  std::printf("%zu keyframes, %zu landmarks, %.0f observations per keyframe\n",
-              graph.frames.size(), graph.points.size(),
-              static_cast<double>(graph.observations.size()) /
-                  static_cast<double>(graph.frames.size()));
+  std::printf(
+      "%zu keyframes, %zu landmarks, %.0f observations per keyframe\n", graph.frames.size(),
+      graph.points.size(),
+      static_cast<double>(graph.observations.size()) / static_cast<double>(graph.frames.size()));
   IncrementalOptions solver;
   solver.window = window;
   GraphFeed feed(std::move(graph), solver);

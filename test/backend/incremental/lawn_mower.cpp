@@ -78,8 +78,7 @@ class Survey {
         static_cast<std::uint32_t>(options_.observations_per_keyframe / footprint * wide * high);
     for (std::uint32_t i = 0; i < count; ++i) {
       const Eigen::Vector3d at(random_.uniform(-margin, wide - margin),
-                               random_.uniform(-margin, high - margin),
-                               random_.uniform(-0.3, 0.3));
+                               random_.uniform(-margin, high - margin), random_.uniform(-0.3, 0.3));
       cells_[cell_of(at.x(), at.y())].push_back(i);
       graph_.points.push_back({at, false});
     }
