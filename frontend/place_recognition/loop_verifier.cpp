@@ -97,6 +97,7 @@ class Verification {
     loop.match = older_.keyframe.id;
     loop.keyframe_from_match = newer_from_older_;
     loop.with_scale = options_.pose.with_scale;
+    loop.observations = newer_.keyframe.observations;
     std::set<LandmarkId> named;
     for (const Match& match : matches_) {
       if (match.newer == match.older || named.contains(match.older)) continue;
