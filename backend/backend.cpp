@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "backend/map/dropped_features.h"
 #include "backend/problem/loop_correction.h"
 #include "backend/problem/solve_bundle.h"
 
@@ -33,6 +34,25 @@ std::vector<LoopEnds> ends_of(const std::vector<PoseConstraint>& loops) {
   std::vector<LoopEnds> ends;
   for (const PoseConstraint& loop : loops) ends.emplace_back(loop.a, loop.b);
   return ends;
+}
+
+// Observations by keypoints of one keyframe; those that it no longer has go.
+void renumber(std::vector<LandmarkObservation>& observations,
+              const std::vector<std::uint32_t>& kept) {
+  std::erase_if(observations, [&](LandmarkObservation& one) {
+    const auto keypoint = new_keypoint(kept, one.observation.keypoint);
+    one.observation.keypoint = keypoint.value_or(one.observation.keypoint);
+    return !keypoint;
+  });
+}
+
+// The measurement by the keypoints that the map has now: without what it names of others.
+LoopMeasurement by_present_keypoints(const MapSnapshot& map, LoopMeasurement loop) {
+  if (loop.observations != nullptr && loop.observations != map.at(loop.keyframe).observations) {
+    loop.new_observations.clear();
+  }
+  loop.observations.reset();
+  return loop;
 }
 
 // How far the map's newer keyframe is from where the loop sees it.
@@ -72,6 +92,16 @@ void Backend::apply(const MapEdit& edit) { map_.apply(edit); }
 
 void Backend::set_keep(KeyframeId id) { map_.set_keep(id); }
 
+void Backend::drop_features(const std::vector<KeyframeId>& keyframes) {
+  for (const KeyframeId id : keyframes) {
+    const std::vector<std::uint32_t> kept = map_.drop_features(id);
+    if (smoother_) smoother_->renumber(id, kept);
+    for (LoopMeasurement& loop : refused_) {
+      if (loop.keyframe == id) renumber(loop.new_observations, kept);
+    }
+  }
+}
+
 BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
   if (options_.local_method == LocalMethod::kBundle) {
     return take_in(solve_bundle(view(), make_local_bundle(view(), newest, options_.local), stop));
@@ -102,7 +132,7 @@ LoopOutcome Backend::close(const LoopMeasurement& loop) {
   LoopOutcome outcome;
   if (view().find(loop.keyframe) == nullptr || view().find(loop.match) == nullptr) return outcome;
   write_discrepancy(view(), loop, outcome);
-  refused_.push_back(loop);  // until it is taken
+  refused_.push_back(by_present_keypoints(view(), loop));  // until it is taken
   LoopClosureOptions options = options_.loops;
   for (const LoopMeasurement& one : refused_) options.graph.with_scale |= one.with_scale;
   const LoopClosure closure =

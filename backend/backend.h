@@ -60,6 +60,10 @@ class Backend {
   void apply(const MapEdit& edit);
   void set_keep(KeyframeId id);  // exempt from culling
 
+  // Of keyframes that are out of use; see Map::drop_features(). What others were told before of
+  // their keypoints still holds: results of earlier snapshots are taken in all the same.
+  void drop_features(const std::vector<KeyframeId>& keyframes);
+
   // Improves the map after the newest keyframe was added, by the method of the options; outlier
   // observations are erased from the map. Bundle adjustment looks at `stop` between iterations and
   // keeps what it has when stopped; an incremental update is short.

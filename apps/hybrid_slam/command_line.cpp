@@ -17,6 +17,7 @@ constexpr const char* kFooter = R"(Writes to DIR:
   map.hslam          the whole map, to go on with (docs/map_file.md); not with --localize
   map.ply, map.png   landmarks and keyframes; map and path from above and from the side
   timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
+  timing.csv         CPU time per stereo frame, of the whole process
   loops.csv          places that were proposed as loops, and what came of them
   summary.json       frames, keyframes, landmarks, options, and ATE where the dataset has truth
 

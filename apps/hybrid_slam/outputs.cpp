@@ -13,6 +13,7 @@
 #include "apps/io/ply.h"
 #include "apps/io/report.h"
 #include "backend/map/map_file.h"
+#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -189,6 +190,14 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence,
   return json;
 }
 
+void write_frame_times(const std::filesystem::path& path, const std::vector<FrameRecord>& records) {
+  std::string text = "time,cpu_ms\n";
+  for (const FrameRecord& record : records) {
+    text += fmt::format("{:.6f},{:.3f}\n", record.frame.time, record.cpu_ms);
+  }
+  write_file(path, text);
+}
+
 }  // namespace
 
 void write_map(const CommandLine& line, const MapSnapshot& map) {
@@ -218,6 +227,7 @@ RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
                                                   fisheye.final_estimate, summary.ate));
   write_loops(out / "loops.csv", result.loops);
   write_json(out / "timing.json", to_json(result.times));
+  write_frame_times(out / "timing.csv", result.records);
   write_json(out / "summary.json", summary_json(line, sequence, upsampling, result, summary));
   if (!line.localize) {
     write_map(line, *result.map);  // the largest: where the disk gets full, the others are there

@@ -13,7 +13,7 @@ RunResult run_every_frame(const FrameSource& source, const SlamOptions& options,
   CheckpointSchedule checkpoints(run.checkpoint_every);
   std::optional<LoopClosing> loops;
   if (options.loops.enabled && !run.localize) {
-    loops.emplace(run.vocabulary, options.loops.finder);
+    loops.emplace(tracking.places(), options.loops.finder);
   }
   const auto publish = [&] { result.map = mapping.snapshot(); };
   const auto close_loop = [&](KeyframeId id) {

@@ -47,6 +47,7 @@ FrameTracking::FrameTracking(const FrameSource& source, const SlamOptions& optio
 }
 
 std::optional<FrameSet> FrameTracking::next(OrderedLoader& loader) {
+  recorder_.frame_done();
   while (!recorder_.cancelled()) {
     auto loaded = loader.next();
     if (!loaded) {

@@ -20,7 +20,8 @@ class FrameTracking {
   FrameTracking(const FrameSource& source, const SlamOptions& options, const RunOptions& run,
                 LocalMapping& mapping, Recorder& recorder, StageTimes& times);
 
-  // Waits for the next frames that could be read. None at the end, or when the run is cancelled.
+  // Waits for the next frames that could be read; those before are done. None at the end, or when
+  // the run is cancelled.
   std::optional<FrameSet> next(OrderedLoader& loader);
 
   // What mapping has to do, if the frame shall become a keyframe.
@@ -30,6 +31,9 @@ class FrameTracking {
   // none.
   std::optional<MappingJob> track_fisheye(FrameSet frames, const MapSnapshot& map,
                                           bool allow_keyframe = true);
+
+  // The words of the map's keyframes, which follow it: for use in the same thread.
+  std::shared_ptr<KeyframeDatabase> places() const { return places_; }
 
  private:
   std::optional<MappingJob> finish(CameraKind camera, TrackedFrame tracked, const MapSnapshot& map);

@@ -30,7 +30,10 @@ void append_counts(const MapEdit& counts, MapEdit& waiting) {
 }
 
 LocalMapping::LocalMapping(const SlamOptions& options, Map map)
-    : options_(options), backend_(options.backend, std::move(map)), probation_(options.culling) {}
+    : options_(options),
+      backend_(options.backend, std::move(map)),
+      probation_(options.culling),
+      use_(options.culling, backend_.view()) {}
 
 CameraId LocalMapping::camera_id(const Camera& camera) {
   const MapSnapshot& map = backend_.view();
@@ -56,6 +59,8 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   clock.lap("local_bundle");
   backend_.apply(cull_keyframes(backend_.view(), id, options_.culling));
   clock.lap("cull_keyframes");
+  backend_.drop_features(use_.gone_out(backend_.view()));
+  clock.lap("drop_features");
   publish();
   return id;
 }

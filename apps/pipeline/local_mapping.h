@@ -62,6 +62,7 @@ class LocalMapping {
   SlamOptions options_;
   Backend backend_;
   LandmarkProbation probation_;
+  KeyframeUse use_;
 };
 
 }  // namespace hybrid_slam

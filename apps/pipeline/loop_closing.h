@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/io/stage_times.h"
@@ -29,8 +31,8 @@ inline constexpr const char* kLoopAccepted = "accepted";
 // of it. Synchronous; one thread at a time.
 class LoopClosing {
  public:
-  LoopClosing(const Vocabulary& vocabulary, const LoopFinderOptions& options)
-      : finder_(vocabulary, options) {}
+  LoopClosing(std::shared_ptr<KeyframeDatabase> places, const LoopFinderOptions& options)
+      : finder_(std::move(places), options) {}
 
   // A verified loop of this keyframe, to be closed by the map's owner, which then says what came
   // of it.

@@ -21,7 +21,9 @@ class Workers {
         checkpoints_(checkpoint, run.checkpoint_every),
         mapping_(mapping, events()) {
     if (options.loops.enabled && !run.localize) {
-      loop_closing_.emplace(run.vocabulary, options.loops.finder);
+      // Its own: tracking has another, in another thread.
+      loop_closing_.emplace(std::make_shared<KeyframeDatabase>(run.vocabulary),
+                            options.loops.finder);
       loops_.emplace(*loop_closing_, mapping_);
       full_bundle_.emplace(options.backend.full, mapping_);
     }

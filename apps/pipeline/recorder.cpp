@@ -1,6 +1,22 @@
 #include "apps/pipeline/recorder.h"
 
+#include <time.h>
+
 namespace hybrid_slam {
+namespace {
+
+double process_cpu_ms() {
+  timespec used{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
+}
+
+}  // namespace
+
+Recorder::Recorder(RunResult& result, const RunHooks& hooks, std::size_t total)
+    : result_(result), hooks_(hooks), cpu_ms_(process_cpu_ms()) {
+  progress_.total = total;
+}
 
 Rigid3d RunResult::cam_from_world(const FrameRecord& record) const {
   if (record.keyframe) {
@@ -45,7 +61,7 @@ void Recorder::tracked(CameraKind camera, const TrackedFrame& frame, const MapSn
   ++counts.read;
   ++(frame.tracked() ? counts.tracked : counts.lost);
   record_of_frame_[{camera, frame.frame_index}] = records.size();
-  FrameRecord record{frame, std::nullopt};
+  FrameRecord record{frame, std::nullopt, 0};
   record.frame.keyframe.reset();
   record.frame.counts = {};
   records.push_back(std::move(record));
@@ -57,6 +73,13 @@ void Recorder::tracked(CameraKind camera, const TrackedFrame& frame, const MapSn
 void Recorder::became_keyframe(CameraKind camera, std::int64_t frame_index, KeyframeId id) {
   auto& records = camera == CameraKind::kStereo ? result_.records : result_.fisheye_records;
   records[record_of_frame_.at({camera, frame_index})].keyframe = id;
+}
+
+void Recorder::frame_done() {
+  if (result_.records.empty()) return;
+  const double now = process_cpu_ms();
+  result_.records.back().cpu_ms += now - cpu_ms_;
+  cpu_ms_ = now;
 }
 
 bool Recorder::cancelled() {

@@ -11,10 +11,7 @@ namespace hybrid_slam {
 // Keeps the books of a run: counts, records, progress. One thread.
 class Recorder {
  public:
-  Recorder(RunResult& result, const RunHooks& hooks, std::size_t total)
-      : result_(result), hooks_(hooks) {
-    progress_.total = total;
-  }
+  Recorder(RunResult& result, const RunHooks& hooks, std::size_t total);
 
   void corrupt(const std::string& reason);
   void fisheye_missing(const std::string& reason);
@@ -22,7 +19,8 @@ class Recorder {
   void dropped(int count) { result_.frames.dropped += count; }
   void tracked(CameraKind camera, const TrackedFrame& frame, const MapSnapshot& map);
   void became_keyframe(CameraKind camera, std::int64_t frame_index, KeyframeId id);
-  bool cancelled();  // asked for? Then the result says so
+  void frame_done();  // that was recorded last: what the process used since belongs to it
+  bool cancelled();   // asked for? Then the result says so
 
  private:
   void warn(const std::string& text);
@@ -31,6 +29,7 @@ class Recorder {
   RunResult& result_;
   const RunHooks& hooks_;
   RunProgress progress_;
+  double cpu_ms_;  // that the process had used when the last frame was done
   std::map<std::pair<CameraKind, std::int64_t>, std::size_t> record_of_frame_;
 };
 

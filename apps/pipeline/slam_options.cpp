@@ -270,6 +270,7 @@ void fields_of(S section, CullingOptions& options) {
       .field("redundant_share", options.redundant_share)
       .field("redundant_observers", options.redundant_observers)
       .field("close_baselines", options.close_baselines)
+      .field("full_keyframes", options.full_keyframes)
       .refuse_unknown();
 }
 

@@ -47,6 +47,9 @@ struct FrameCounts {
 struct FrameRecord {
   TrackedFrame frame;                  // without its keyframe and counts
   std::optional<KeyframeId> keyframe;  // the keyframe it became
+  // Of a stereo frame: of the whole process, all its threads, from when this frame was taken up to
+  // when the next one was [ms]. The first one's has the start of the run.
+  double cpu_ms = 0;
 };
 
 struct RunProgress {

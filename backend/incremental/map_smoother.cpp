@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "backend/map/dropped_features.h"
 #include "backend/problem/odometry_constraints.h"
 
 namespace hybrid_slam {
@@ -14,6 +15,13 @@ namespace {
 // What the share of odometry that counts may be off by before its edge is made anew. The odometer
 // knows its own noise no better, from some tens of matches.
 constexpr double kShareTolerance = 0.1;
+
+// One motion between the same keyframes, or none; whatever became of the keypoints.
+bool say_the_same(const Odometry* a, const Odometry* b) {
+  if (a == nullptr || b == nullptr) return a == b;
+  return a->previous == b->previous && a->motion.b_from_a.params == b->motion.b_from_a.params &&
+         a->motion.covariance == b->motion.covariance;
+}
 
 }  // namespace
 
@@ -50,6 +58,22 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
   summary.outliers = static_cast<int>(result.outliers.size());
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
+}
+
+// What it sees without the map knowing of it any more gets a keypoint that none has: the update
+// takes it out.
+void MapSmoother::renumber(KeyframeId keyframe, std::span<const std::uint32_t> kept) {
+  const Keyframe* known = known_map_ != nullptr ? known_map_->find(keyframe) : nullptr;
+  if (known == nullptr) return;
+  for (const LandmarkId id : known->landmarks) {
+    const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
+    if (found == landmarks_.end()) continue;
+    for (View& view : found->second.views) {
+      if (view.seen.keyframe == keyframe) {
+        view.seen.keypoint = new_keypoint(kept, view.seen.keypoint).value_or(kNone);
+      }
+    }
+  }
 }
 
 // A loop was closed, or everything adjusted: the map is no longer where the last result left it.
@@ -119,8 +143,9 @@ void MapSmoother::take_in_odometry(const MapSnapshot& map, KeyframeId id) {
     return;  // moved, no more
   }
   const double share = odometry != nullptr ? unshared(map, *keyframe) : 0;
-  if (known.odometry == odometry && std::abs(share - known.share) <= kShareTolerance) return;
+  const bool same = say_the_same(known.odometry.get(), odometry.get());
   known.odometry = odometry;
+  if (same && std::abs(share - known.share) <= kShareTolerance) return;
   known.share = share;
   if (known.marginalized) return;  // it is in the prior, and must not count twice
   if (known.edge != kNone) solver_.remove_edge(std::exchange(known.edge, kNone));

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -35,6 +36,10 @@ class MapSmoother {
   // problem from the next update on, whose map must have both. With a window it holds the present
   // to a past that no longer varies.
   void add_loop(const PoseConstraint& loop) { new_loops_.push_back(loop); }
+
+  // Features of a keyframe were dropped from the map: `kept` are the old indices of those it has
+  // still, ascending. To be called each time, before the update that sees it.
+  void renumber(KeyframeId keyframe, std::span<const std::uint32_t> kept);
 
   // The map as it is now, with `newest` in it. The result holds what moved, and as outliers the
   // observations beyond their threshold of the landmarks that `newest` sees: they are out of the

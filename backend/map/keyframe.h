@@ -18,7 +18,8 @@ struct Covisible {
 };
 
 // A frame that stays in the map. Its observations never change and are shared; its pose and its
-// links do. The map's verbs (backend/map/map.h) are the only writers.
+// links do, and its observations are replaced where Map::drop_features() says so. The map's verbs
+// (backend/map/map.h) are the only writers.
 struct Keyframe {
   KeyframeId id;
   std::shared_ptr<const FrameObservations> observations;

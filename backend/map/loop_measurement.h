@@ -1,7 +1,9 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "backend/map/frame_observations.h"
 #include "backend/map/ids.h"
 #include "backend/map/map_edit.h"
 #include "cameras/geometry/sim3d.h"
@@ -24,6 +26,8 @@ struct LoopMeasurement {
   // Landmarks of the older side that `keyframe` sees in keypoints without a landmark. Their merged
   // counterparts in `same` do not occur here.
   std::vector<LandmarkObservation> new_observations;
+  // Whose keypoints these are: the observations of `keyframe` then. Null: those it has in the map.
+  std::shared_ptr<const FrameObservations> observations{};
 };
 
 }  // namespace hybrid_slam

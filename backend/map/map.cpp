@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "backend/map/dropped_features.h"
 #include "backend/map/landmark_attributes.h"
 #include "backend/map/map_transaction.h"
 #include "backend/map/odometry.h"
@@ -40,13 +41,15 @@ void validate(const MapTables& tables, const NewKeyframe& made) {
 
 // Nothing that has gone is a fault; what can never have been right is.
 void validate(const MapTables& tables, const MapEdit& edit) {
-  const auto check = [&](const Observation& observation) {
+  const auto check = [&](const Observation& observation, bool may_be_dropped = false) {
     const Keyframe* keyframe = tables.keyframes.find(observation.keyframe.value);
-    require(keyframe == nullptr || observation.keypoint < keyframe->landmarks.size(),
+    const std::size_t dropped =
+        keyframe != nullptr && may_be_dropped ? keyframe->observations->dropped : 0;
+    require(keyframe == nullptr || observation.keypoint < keyframe->landmarks.size() + dropped,
             "Map::apply: no such keypoint");
   };
   for (const auto& added : edit.new_observations) check(added.observation);
-  for (const auto& erased : edit.erased_observations) check(erased.observation);
+  for (const auto& erased : edit.erased_observations) check(erased.observation, true);
   for (const auto& landmark : edit.new_landmarks) {
     require(landmark.point_in_world.allFinite(), "Map::apply: point is not finite");
     for (const Observation& observation : landmark.observations) check(observation);
@@ -158,6 +161,20 @@ void Map::set_camera(CameraId id, const Camera& camera) {
 void Map::set_keep(KeyframeId id) {
   auto& keyframes = view_.tables_.keyframes;
   if (keyframes.find(id.value) != nullptr) keyframes.edit(id.value).keep = true;
+}
+
+std::vector<std::uint32_t> Map::drop_features(KeyframeId id) {
+  MapTables& tables = view_.tables_;
+  const Keyframe* keyframe = tables.keyframes.find(id.value);
+  if (keyframe == nullptr) return {};
+  std::vector<std::uint32_t> kept;
+  for (std::uint32_t keypoint = 0; keypoint < keyframe->landmarks.size(); ++keypoint) {
+    const bool stays =
+        keyframe->landmarks[keypoint].valid() || keyframe->observations->has_right(keypoint);
+    if (stays) kept.push_back(keypoint);
+  }
+  if (kept.size() < keyframe->landmarks.size()) keep_features(tables, id, kept);
+  return kept;
 }
 
 std::shared_ptr<const MapSnapshot> Map::snapshot() {

@@ -31,6 +31,12 @@ class Map {
   void set_camera(CameraId id, const Camera& camera);  // refined intrinsics
   void set_keep(KeyframeId id);                        // exempt from culling
 
+  // Drops the features of a keyframe that have neither a landmark nor a right match. The others
+  // keep their order and get new indices, wherever the map names them. Returns their old ones,
+  // ascending; nothing was done, and the indices hold, if that is all of them. Empty for a keyframe
+  // that is not in the map.
+  std::vector<std::uint32_t> drop_features(KeyframeId id);
+
   const MapSnapshot& view() const { return view_; }  // valid until the next verb
   std::shared_ptr<const MapSnapshot> snapshot();
 

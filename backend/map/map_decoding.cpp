@@ -18,6 +18,7 @@ namespace {
 
 constexpr std::size_t kSingleSections = 3;  // info, cameras, state
 constexpr std::uint32_t kOdometryVersion = 3;
+constexpr std::uint32_t kDroppedVersion = 4;
 constexpr std::size_t kNumbersPerKeypoint = 6;
 constexpr std::uint32_t kMaxCount = 1'000'000'000;  // of frames: the sum of two is an int
 constexpr double kMaxNormError = 1e-6;              // of a quaternion
@@ -85,7 +86,15 @@ void check(ByteReader& in, const Keypoint& keypoint) {
   if (keypoint.scale < 0 || !(keypoint.sigma > 0)) in.fail("keypoint without a scale or a sigma");
 }
 
-std::shared_ptr<const FrameObservations> read_frame(ByteReader& in) {
+// Of features; none in files that know of none.
+std::uint32_t read_dropped(ByteReader& in, std::uint32_t version) {
+  if (version < kDroppedVersion) return 0;
+  const auto dropped = in.number<std::uint32_t>();
+  if (dropped > kMaxCount) in.fail("more dropped features than an image can have");
+  return dropped;
+}
+
+std::shared_ptr<const FrameObservations> read_frame(ByteReader& in, std::uint32_t version) {
   auto frame = std::make_shared<FrameObservations>();
   frame->camera = CameraId(in.number<std::uint32_t>());
   frame->frame_index = in.number<std::int64_t>();
@@ -115,6 +124,7 @@ std::shared_ptr<const FrameObservations> read_frame(ByteReader& in) {
     const std::string_view bytes = in.bytes(descriptor.size());
     std::copy(bytes.begin(), bytes.end(), descriptor.begin());
   }
+  frame->dropped = read_dropped(in, version);
   return frame;
 }
 
@@ -201,7 +211,7 @@ class MapDecoder {
     keyframe.parent = KeyframeId(in.number<std::uint32_t>());
     keyframe.keep = read_flag(in);
     keyframe.cam_from_world = read_pose(in);
-    keyframe.observations = read_frame(in);
+    keyframe.observations = read_frame(in, version_);
     const FrameObservations& frame = *keyframe.observations;
     if (frame.camera.value >= tables_.cameras.size()) in.fail("unknown camera");
     if (!frame.u_right.empty() && !(baseline(tables_.cameras[frame.camera.value]) > 0)) {
@@ -223,6 +233,7 @@ class MapDecoder {
     odometry.motion.covariance = read_covariance(in);
     odometry.keypoints.resize(in.count<std::uint32_t>(sizeof(std::uint32_t)));
     for (std::uint32_t& keypoint : odometry.keypoints) keypoint = in.number<std::uint32_t>();
+    odometry.dropped = read_dropped(in, version_);
     if (!is_valid(odometry, tables_.keyframes.find(id)->landmarks.size())) {
       in.fail("odometry without a covariance, or by keypoints that are not there");
     }

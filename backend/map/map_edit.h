@@ -44,7 +44,9 @@ struct NewKeyframe {
 
 // A transaction: applied whole, in the order of the members below. It was made from a snapshot, so
 // what it names may have gone meanwhile: such entries are skipped, and so is an observation whose
-// keypoint or keyframe already has another landmark.
+// keypoint or keyframe already has another landmark. Where features were dropped since the
+// snapshot, erased observations are found again; new ones must name the keypoints that the map has
+// now.
 struct MapEdit {
   std::vector<LandmarkMerge> merged;
   std::vector<LandmarkObservation> new_observations;

@@ -47,6 +47,7 @@ void write(ByteWriter& out, const FrameObservations& frame) {
   for (const Descriptor& descriptor : frame.features.descriptors) {
     out.bytes({reinterpret_cast<const char*>(descriptor.data()), descriptor.size()});
   }
+  out.number(frame.dropped);
 }
 
 // Landmarks, covisible keyframes and children follow from what else is written.
@@ -69,6 +70,7 @@ void write(ByteWriter& out, KeyframeId id, const Odometry& odometry) {
   }
   out.number(static_cast<std::uint32_t>(odometry.keypoints.size()));
   for (const std::uint32_t keypoint : odometry.keypoints) out.number(keypoint);
+  out.number(odometry.dropped);
 }
 
 // The descriptor is that of one of the observations and follows from them; the numbers would too,

@@ -7,7 +7,7 @@
 
 namespace hybrid_slam {
 
-inline constexpr SectionFileFormat kMapFileFormat{"\x89HSLMAP\n", 3, "map file", 2};
+inline constexpr SectionFileFormat kMapFileFormat{"\x89HSLMAP\n", 4, "map file", 2};
 
 // The sections in their order. The first three kinds come once; the others as often as it takes.
 inline constexpr std::string_view kInfoSection = "info";

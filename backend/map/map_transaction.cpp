@@ -54,9 +54,20 @@ void MapTransaction::add_observation(LandmarkId id, const Observation& observati
 
 void MapTransaction::remove_observation(LandmarkId id, const Observation& observation) {
   const Keyframe* keyframe = tables_.keyframes.find(observation.keyframe.value);
-  if (keyframe == nullptr || !id.valid() || keyframe->landmarks[observation.keypoint] != id) return;
+  if (keyframe == nullptr || tables_.landmarks.find(id.value) == nullptr) return;
+  const std::vector<Observation>& all = tables_.landmarks.find(id.value)->observations;
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Observation& one) {
+    return one.keyframe == observation.keyframe;
+  });
+  if (found == all.end()) return;
+  const bool may_have_moved = keyframe->observations->dropped > 0;
+  if (found->keypoint > observation.keypoint ||
+      (found->keypoint < observation.keypoint && !may_have_moved)) {
+    return;
+  }
+  const Observation seen = *found;
   Landmark& landmark = tables_.landmarks.edit(id.value);
-  unlink(landmark, observation);
+  unlink(landmark, seen);
   if (!is_supported(tables_, landmark)) erase_landmark(id);
 }
 

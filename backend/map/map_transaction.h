@@ -18,7 +18,8 @@ class MapTransaction {
   // Skipped if the keypoint has a landmark already or the keyframe sees this landmark elsewhere.
   void add_observation(LandmarkId id, const Observation& observation);
 
-  // The landmark goes too if it is left without support.
+  // The landmark goes too if it is left without support. Skipped if the keyframe sees it elsewhere;
+  // a keypoint whose index was a higher one before features were dropped is not elsewhere.
   void remove_observation(LandmarkId id, const Observation& observation);
 
   // Not born if the observations that can be had do not support it.

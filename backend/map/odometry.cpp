@@ -60,7 +60,7 @@ void detach_odometry(MapTables& tables, KeyframeId id) {
   std::shared_ptr<const Odometry> both;
   if (to != nullptr) {
     both = std::make_shared<const Odometry>(
-        Odometry{to->previous, from->motion * to->motion, from->keypoints});
+        Odometry{to->previous, from->motion * to->motion, from->keypoints, from->dropped});
   }
   tables.keyframes.edit(after.value).odometry = std::move(both);
 }

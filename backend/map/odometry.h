@@ -20,6 +20,9 @@ struct Odometry {
   // Keypoints of this keyframe that the odometer followed into it, ascending. Where they are
   // landmarks that both keyframes see, the map holds the same measurements a second time.
   std::vector<std::uint32_t> keypoints;
+  std::uint32_t dropped = 0;  // followed likewise, and no longer among the keyframe's features
+
+  std::size_t followed() const { return keypoints.size() + dropped; }
 };
 
 // Whether all is finite, the covariance symmetric and positive definite, and every keypoint one of

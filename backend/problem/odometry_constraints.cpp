@@ -22,7 +22,7 @@ double unshared(const MapSnapshot& map, const Keyframe& keyframe) {
   };
   const auto shared =
       std::count_if(odometry.keypoints.begin(), odometry.keypoints.end(), is_shared);
-  return 1 - static_cast<double>(shared) / static_cast<double>(odometry.keypoints.size());
+  return 1 - static_cast<double>(shared) / static_cast<double>(odometry.followed());
 }
 
 std::optional<PoseConstraint> odometry_constraint(const Keyframe& keyframe, double share) {

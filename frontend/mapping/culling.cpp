@@ -1,11 +1,14 @@
 #include "frontend/mapping/culling.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 namespace hybrid_slam {
 namespace {
 
+constexpr int kNeighbours = 15;  // landmarks in common, as fusion and the search for loops count
 constexpr double kSameScale = 1.26;  // a third of an octave: SIFT's step between scales
 
 int weighted_observations(const MapSnapshot& map, const Landmark& landmark) {
@@ -84,6 +87,7 @@ std::string CullingOptions::validate() const {
     return "culling: min_observations, probation and redundant_observers must be positive";
   }
   if (!(close_baselines > 0)) return "culling: close_baselines must be positive";
+  if (full_keyframes < 0) return "culling: full_keyframes must not be negative";
   return {};
 }
 
@@ -122,6 +126,29 @@ MapEdit LandmarkProbation::cull(const MapSnapshot& map, KeyframeId newest) {
     return unseen || weak || recent.keyframes > options_.probation;
   });
   return edit;
+}
+
+std::vector<KeyframeId> KeyframeUse::gone_out(const MapSnapshot& map) {
+  if (options_.full_keyframes == 0) return {};
+  std::vector<KeyframeId> now;
+  int newest = 0;
+  for (std::uint32_t id = map.next_keyframe_id().value; id > 0 && newest < options_.full_keyframes;
+       --id) {
+    const Keyframe* keyframe = map.find(KeyframeId(id - 1));
+    if (keyframe == nullptr) continue;
+    ++newest;
+    now.push_back(keyframe->id);
+    for (const Covisible& covisible : keyframe->covisible) {
+      if (covisible.shared_landmarks >= kNeighbours) now.push_back(covisible.id);
+    }
+  }
+  std::sort(now.begin(), now.end());
+  now.erase(std::unique(now.begin(), now.end()), now.end());
+  std::vector<KeyframeId> gone;
+  std::set_difference(in_use_.begin(), in_use_.end(), now.begin(), now.end(),
+                      std::back_inserter(gone));
+  in_use_ = std::move(now);
+  return gone;
 }
 
 MapEdit cull_keyframes(const MapSnapshot& map, KeyframeId keyframe, const CullingOptions& options) {

@@ -15,6 +15,9 @@ struct CullingOptions {
   double redundant_share = 0.9;  // of a keyframe's landmarks seen elsewhere
   int redundant_observers = 3;   // by so many others, at the same or a finer scale
   double close_baselines = 40;   // stereo: only nearer landmarks count
+  // So many of the newest keyframes, and those that share 15 landmarks with one of them, are in use
+  // and keep features with neither a landmark nor a right match. 0: all keep them.
+  int full_keyframes = 10;
 
   std::string validate() const;
 };
@@ -39,6 +42,22 @@ class LandmarkProbation {
   std::vector<Recent> recent_;
   KeyframeId previous_;
   LandmarkId newest_known_;
+};
+
+// Watches which keyframes go out of use. Mapping makes landmarks of features that have none where
+// it looks, and that is in keyframes that share landmarks with the newest one.
+class KeyframeUse {
+ public:
+  // Of a map that is gone on with, all count as being in use so far.
+  KeyframeUse(const CullingOptions& options, const MapSnapshot& map)
+      : options_(options), in_use_(map.keyframe_ids()) {}
+
+  // Called once per keyframe, after all that it changes: which are no longer in use, ascending.
+  std::vector<KeyframeId> gone_out(const MapSnapshot& map);
+
+ private:
+  CullingOptions options_;
+  std::vector<KeyframeId> in_use_;  // ascending
 };
 
 // Keyframes around `keyframe` that add little: nearly all their (close) landmarks are seen by

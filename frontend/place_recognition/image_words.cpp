@@ -23,6 +23,12 @@ BowVector make_bow(const Vocabulary& vocabulary, const std::vector<Vocabulary::P
   return bow;
 }
 
+void sort(DirectIndex& index) {
+  std::sort(index.begin(), index.end(), [](const NodeFeature& a, const NodeFeature& b) {
+    return a.node != b.node ? a.node < b.node : a.feature < b.feature;
+  });
+}
+
 }  // namespace
 
 ImageWords find_words(const Vocabulary& vocabulary, const FeatureSet& features) {
@@ -32,10 +38,21 @@ ImageWords find_words(const Vocabulary& vocabulary, const FeatureSet& features) 
   for (std::size_t i = 0; i < places.size(); ++i) {
     words.index.push_back({places[i].guide, static_cast<int>(i)});
   }
-  std::sort(words.index.begin(), words.index.end(), [](const NodeFeature& a, const NodeFeature& b) {
-    return a.node != b.node ? a.node < b.node : a.feature < b.feature;
-  });
+  sort(words.index);
   return words;
+}
+
+DirectIndex find_index(const Vocabulary& vocabulary, const FeatureSet& features,
+                       std::span<const int> some) {
+  std::vector<Descriptor> descriptors;
+  descriptors.reserve(some.size());
+  for (const int i : some) descriptors.push_back(features.descriptors[static_cast<std::size_t>(i)]);
+  const auto places = vocabulary.find(features.kind, descriptors);
+  DirectIndex index;
+  index.reserve(some.size());
+  for (std::size_t i = 0; i < some.size(); ++i) index.push_back({places[i].guide, some[i]});
+  sort(index);
+  return index;
 }
 
 double bow_score(const BowVector& a, const BowVector& b) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "frontend/place_recognition/vocabulary.h"
@@ -34,6 +35,10 @@ struct ImageWords {
 
 // Throws std::logic_error if the features are of another kind than the vocabulary.
 ImageWords find_words(const Vocabulary& vocabulary, const FeatureSet& features);
+
+// The direct index of some of the features, ascending. Throws likewise.
+DirectIndex find_index(const Vocabulary& vocabulary, const FeatureSet& features,
+                       std::span<const int> some);
 
 // The L1 score: 1 - |a - b| / 2, from 0 (no common word) to 1 (equal).
 double bow_score(const BowVector& a, const BowVector& b);

@@ -20,20 +20,24 @@ void KeyframeDatabase::follow(const MapSnapshot& map) {
 void KeyframeDatabase::add(const Keyframe& keyframe) {
   const FeatureSet& features = keyframe.observations->features;
   if (!knows(features.kind)) return;
-  ImageWords words = words_of(features);
-  inverted_.add(keyframe.id, words.bow);
-  indices_.emplace(keyframe.id, std::move(words.index));
+  inverted_.add(keyframe.id, words_of(features).bow);
+  known_.push_back(keyframe.id);
 }
 
 void KeyframeDatabase::forget_erased(const MapSnapshot& map) {
-  for (auto entry = indices_.begin(); entry != indices_.end();) {
-    if (map.find(entry->first) == nullptr) {
-      inverted_.remove(entry->first);
-      entry = indices_.erase(entry);
-    } else {
-      ++entry;
-    }
+  std::erase_if(known_, [&](KeyframeId id) {
+    const bool gone = map.find(id) == nullptr;
+    if (gone) inverted_.remove(id);
+    return gone;
+  });
+}
+
+DirectIndex KeyframeDatabase::index_of(const Keyframe& keyframe) const {
+  std::vector<int> with_landmark;
+  for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    if (keyframe.landmarks[i].valid()) with_landmark.push_back(static_cast<int>(i));
   }
+  return find_index(vocabulary_, keyframe.observations->features, with_landmark);
 }
 
 std::vector<SimilarKeyframe> KeyframeDatabase::similar(const BowVector& bow, std::size_t count,

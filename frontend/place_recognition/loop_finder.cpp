@@ -17,8 +17,8 @@ std::string LoopFinderOptions::validate() const {
   return error.empty() ? verifier.validate() : error;
 }
 
-LoopFinder::LoopFinder(const Vocabulary& vocabulary, const LoopFinderOptions& options)
-    : places_(vocabulary),
+LoopFinder::LoopFinder(std::shared_ptr<KeyframeDatabase> places, const LoopFinderOptions& options)
+    : places_(std::move(places)),
       detector_(options.detector),
       verifier_(options.verifier),
       min_shared_landmarks_(options.verifier.min_shared_landmarks) {
@@ -28,12 +28,12 @@ LoopFinder::LoopFinder(const Vocabulary& vocabulary, const LoopFinderOptions& op
 
 std::vector<LoopProposal> LoopFinder::find(const MapSnapshot& map, KeyframeId keyframe) {
   std::vector<LoopProposal> proposals;
-  places_.follow(map);
+  places_->follow(map);
   const Keyframe* there = map.find(keyframe);
-  if (there == nullptr || !places_.knows(there->observations->features.kind)) return proposals;
+  if (there == nullptr || !places_->knows(there->observations->features.kind)) return proposals;
   std::vector<Ends> unconfirmed;
-  for (const KeyframeId match : detector_.detect(map, places_, keyframe)) {
-    proposals.push_back({keyframe, match, verifier_.verify(map, keyframe, match, places_)});
+  for (const KeyframeId match : detector_.detect(map, *places_, keyframe)) {
+    proposals.push_back({keyframe, match, verifier_.verify(map, keyframe, match, *places_)});
     if (proposals.back().verification.loop) {
       unconfirmed_.clear();
       return proposals;
@@ -59,7 +59,7 @@ std::optional<LoopProposal> LoopFinder::confirm_earlier(const MapSnapshot& map,
     return shared_landmarks(newest, ends.keyframe) < min_shared_landmarks_;
   });
   for (const Ends& ends : unconfirmed_) {
-    LoopVerification found = verifier_.verify(map, ends.keyframe, ends.match, places_);
+    LoopVerification found = verifier_.verify(map, ends.keyframe, ends.match, *places_);
     if (!found.loop) continue;
     unconfirmed_.clear();
     return LoopProposal{ends.keyframe, ends.match, std::move(found)};

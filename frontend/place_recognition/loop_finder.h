@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,8 +30,9 @@ struct LoopProposal {
 // thread at a time.
 class LoopFinder {
  public:
-  // Throws std::invalid_argument if the options are not valid.
-  LoopFinder(const Vocabulary& vocabulary, const LoopFinderOptions& options);
+  // `places` may have other users in the same thread. Throws std::invalid_argument if the options
+  // are not valid.
+  LoopFinder(std::shared_ptr<KeyframeDatabase> places, const LoopFinderOptions& options);
 
   // To be called once for each new keyframe, in their order. What was examined, best first, up to
   // and including the first that is a loop. Without one, a loop of a keyframe before it that only
@@ -46,7 +48,7 @@ class LoopFinder {
 
   std::optional<LoopProposal> confirm_earlier(const MapSnapshot& map, KeyframeId keyframe);
 
-  KeyframeDatabase places_;
+  std::shared_ptr<KeyframeDatabase> places_;
   LoopDetector detector_;
   LoopVerifier verifier_;
   int min_shared_landmarks_;       // that make two keyframes neighbours

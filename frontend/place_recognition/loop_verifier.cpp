@@ -97,6 +97,7 @@ class Verification {
     loop.match = older_.keyframe.id;
     loop.keyframe_from_match = newer_from_older_;
     loop.with_scale = options_.pose.with_scale;
+    loop.observations = newer_.keyframe.observations;
     std::set<LandmarkId> named;
     for (const Match& match : matches_) {
       if (match.newer == match.older || named.contains(match.older)) continue;
@@ -114,22 +115,13 @@ class Verification {
   }
 
   std::vector<Match> match_descriptors() const {
-    const auto with_landmarks = [&](const KeyframeView& view) {
-      DirectIndex index;
-      for (const NodeFeature& entry : places_.index_of(view.keyframe.id)) {
-        if (view.keyframe.landmarks[static_cast<std::size_t>(entry.feature)].valid()) {
-          index.push_back(entry);
-        }
-      }
-      return index;
-    };
     BruteForceOptions matching;
     matching.ratio = options_.ratio;
     matching.max_descriptor_distance = options_.max_descriptor_distance;
     std::vector<Match> matches;
     for (const DescriptorMatch& match :
-         match_guided(newer_.observations.features, with_landmarks(newer_),
-                      older_.observations.features, with_landmarks(older_), matching)) {
+         match_guided(newer_.observations.features, places_.index_of(newer_.keyframe),
+                      older_.observations.features, places_.index_of(older_.keyframe), matching)) {
       const LandmarkId newer = newer_.keyframe.landmarks[static_cast<std::size_t>(match.query)];
       const LandmarkId older = older_.keyframe.landmarks[static_cast<std::size_t>(match.train)];
       if (newer != older) matches.push_back({match.query, newer, older});

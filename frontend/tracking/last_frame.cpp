@@ -13,7 +13,10 @@ void LastFrame::follow(const MapSnapshot& map) {
     if (keyframe != nullptr && cam_from_requested_) {
       reference_ = keyframe->id;
       cam_from_reference_ = *cam_from_requested_;
-      if (frame_->index == *requested_) frame_->landmarks = keyframe->landmarks;
+      const bool is_that = frame_->index == *requested_;
+      // Not so if it went out of use before this camera saw anything again.
+      const bool has_all_features = keyframe->landmarks.size() == frame_->size();
+      if (is_that && has_all_features) frame_->landmarks = keyframe->landmarks;
     }
     if (map.newest_frame_index(camera_) >= *requested_) {
       requested_.reset();

@@ -160,8 +160,8 @@ bool MapMatcher::find_place(const MapSnapshot& map, std::span<const KeyframeId> 
     keyframes.push_back(similar.keyframe);
   }
   const auto match_guided = [&](KeyframeId id) {
-    return match_keyframe_guided(map, id, places_->index_of(id), frame.features.left, words.index,
-                                 options.ratio, options.max_descriptor_distance);
+    return match_keyframe_guided(map, id, places_->index_of(map.at(id)), frame.features.left,
+                                 words.index, options.ratio, options.max_descriptor_distance);
   };
   return relocalize(map, keyframes, match_guided, frame);
 }

@@ -148,15 +148,12 @@ std::vector<LandmarkId> match_keyframe_guided(const MapSnapshot& map, KeyframeId
   const auto landmark_of = [&](int feature) {
     return reference.landmarks[static_cast<std::size_t>(feature)];
   };
-  DirectIndex with_landmark;
-  std::copy_if(keyframe_index.begin(), keyframe_index.end(), std::back_inserter(with_landmark),
-               [&](const NodeFeature& entry) { return landmark_of(entry.feature).valid(); });
   BruteForceOptions options;
   options.ratio = ratio;
   options.max_descriptor_distance = max_descriptor_distance;
   std::vector<LandmarkId> result(features.size());
   for (const DescriptorMatch& match :
-       match_guided(reference.observations->features, with_landmark, features, index, options)) {
+       match_guided(reference.observations->features, keyframe_index, features, index, options)) {
     result[static_cast<std::size_t>(match.train)] = landmark_of(match.query);
   }
   return result;

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <csignal>
 #include <set>
+#include <sstream>
+#include <thread>
 
 #include <catch2/catch.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -20,7 +22,7 @@ using Json = nlohmann::json;
 constexpr double kMaxAte = 0.003;  // [m]; the path is 1.6 m long, the ground 2 m away
 constexpr const char* kResults[] = {"stereo.tum",  "stereo_online.tum", "map.hslam",
                                     "map.ply",     "map.png",           "loops.csv",
-                                    "timing.json", "summary.json"};
+                                    "timing.json", "timing.csv",        "summary.json"};
 
 std::string engine_by_default() {
   return to_string(why_no_cuda_sift({}).empty() ? SiftDevice::kCuda : SiftDevice::kCpu);
@@ -57,6 +59,27 @@ Json check_results(const fs::path& out) {
   }
   CHECK(from == static_cast<int>(tracked));
   return summary;
+}
+
+// A row per stereo frame; together, what a run of so many seconds can have used.
+void check_frame_times(const fs::path& out, double seconds) {
+  std::istringstream rows(read_text(out / "timing.csv"));
+  std::string row;
+  REQUIRE(std::getline(rows, row));
+  CHECK(row == "time,cpu_ms");
+  const Trajectory poses = read_trajectory(out / "stereo.tum").poses;
+  double sum = 0;
+  for (const StampedPose& pose : poses) {
+    REQUIRE(std::getline(rows, row));
+    const std::size_t comma = row.find(',');
+    CHECK(std::stod(row.substr(0, comma)) == Approx(pose.time).margin(1e-6));
+    const double cpu_ms = std::stod(row.substr(comma + 1));
+    CHECK(cpu_ms > 0);
+    sum += cpu_ms;
+  }
+  CHECK_FALSE(std::getline(rows, row));
+  CHECK(sum > 1e3 * 0.05 * seconds);
+  CHECK(sum < 1e3 * seconds * std::thread::hardware_concurrency());
 }
 
 TEST_CASE("hybrid_slam tracks a survey and writes what it documents") {
@@ -97,6 +120,7 @@ TEST_CASE("hybrid_slam tracks a survey and writes what it documents") {
     CHECK(times["p99"].get<double>() <= times["max"].get<double>());
   }
   CHECK(timing["track"]["count"] == kSurveyFrames);
+  check_frame_times(out, summary["seconds"].get<double>());
 }
 
 TEST_CASE("poses are those of the left camera, in the dataset's times") {

@@ -147,12 +147,12 @@ TEST_CASE("a damaged file is refused with its name, the place and the reason") {
     refused_as("no map file");
   }
   SECTION("of a later version") {
-    bytes[8] = 4;
-    refused_as("version 4 of the format, where this program knows 2 to 3");
+    bytes[8] = 5;
+    refused_as("version 5 of the format, where this program knows 2 to 4");
   }
   SECTION("of an earlier version") {
     bytes[8] = 1;
-    refused_as("version 1 of the format, where this program knows 2 to 3");
+    refused_as("version 1 of the format, where this program knows 2 to 4");
   }
   SECTION("a byte changed") {
     bytes[bytes.size() / 2] ^= 4;

@@ -137,7 +137,27 @@ TEST_CASE(
   CHECK(map.at(KeyframeId(2)).odometry == nullptr);
   const TempFolder folder;
   save_map(folder.path() / "again", map, loaded.info);
-  CHECK(read_text(folder.path() / "again").substr(8, 1) == "\3");
+  CHECK(read_text(folder.path() / "again").substr(8, 1) == "\4");
+  check_same_map(map, load_map(folder.path() / "again").map.view());
+}
+
+// Made by hybrid_slam of the last program that wrote version 3, of two rendered pairs.
+TEST_CASE("a map file of version 3 is still read: nothing was dropped in it") {
+  const std::filesystem::path path = std::filesystem::path(HYBRID_SLAM_MAPS) / "version_3.hslam";
+  REQUIRE(read_text(path).substr(8, 1) == "\3");
+  LoadedMap loaded = load_map(path);
+  const MapSnapshot& map = loaded.map.view();
+  REQUIRE(map.keyframe_count() == 2);
+  CHECK(map.landmark_count() == 52);
+  const Keyframe& second = map.at(map.keyframe_ids().back());
+  CHECK(second.observations->size() > 50);
+  CHECK(second.observations->dropped == 0);
+  REQUIRE(second.odometry != nullptr);
+  CHECK(second.odometry->keypoints.size() > 5);
+  CHECK(second.odometry->dropped == 0);
+  const TempFolder folder;
+  save_map(folder.path() / "again", map, loaded.info);
+  CHECK(read_text(folder.path() / "again").substr(8, 1) == "\4");
   check_same_map(map, load_map(folder.path() / "again").map.view());
 }
 

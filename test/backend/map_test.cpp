@@ -83,6 +83,47 @@ TEST_CASE("The first keyframe is the origin and its stereo points are born") {
   CHECK(tiny.consistent());
 }
 
+TEST_CASE("Features of no use are dropped, and all that names the others follows") {
+  TinyMap tiny = map_with_origin(6);
+  NewKeyframe made = tiny.frame(10);
+  for (const std::uint32_t i : {1, 4, 5, 9}) made.landmarks[i] = LandmarkId(i % 6);
+  auto observations_then = std::make_shared<FrameObservations>(*made.observations);
+  for (const std::uint32_t i : {0, 1, 2, 3, 6, 8}) observations_then->u_right[i] = kNoRightMatch;
+  made.observations = observations_then;  // without landmark 0, 2, 3, 6, 7, 8; of these 7 is stereo
+  made.odometry = std::make_shared<const Odometry>(
+      Odometry{KeyframeId(0), {{}, Vector6d::Constant(1e-4).asDiagonal()}, {0, 4, 8, 9}});
+  const KeyframeId id = tiny.map.add_keyframe(made);
+  const auto before = tiny.map.snapshot();
+  CHECK(tiny.map.drop_features(id) == std::vector<std::uint32_t>{1, 4, 5, 7, 9});
+  CHECK(tiny.consistent());
+  const Keyframe& keyframe = tiny.view().at(id);
+  CHECK(keyframe.landmarks == std::vector<LandmarkId>{LandmarkId(1), LandmarkId(4), LandmarkId(5),
+                                                      LandmarkId(), LandmarkId(3)});
+  CHECK(keyframe.observations->u_right.size() == 5);
+  CHECK(keyframe.observations->dropped == 5);
+  CHECK(keyframe.observations->features.descriptors[4] ==
+        made.observations->features.descriptors[9]);
+  CHECK(keyframe.odometry->keypoints == std::vector<std::uint32_t>{1, 4});
+  CHECK(keyframe.odometry->followed() == 4);
+  CHECK(tiny.view().at(LandmarkId(3)).observations.back() == Observation{id, 4});
+  CHECK(tiny.view().at(LandmarkId(3)).descriptor == before->at(LandmarkId(3)).descriptor);
+  CHECK(before->at(id).observations == made.observations);  // others look at what they had
+  CHECK(before->at(LandmarkId(3)).observations.back() == Observation{id, 9});
+  const auto observations = keyframe.observations;
+  CHECK(tiny.map.drop_features(id) == std::vector<std::uint32_t>{0, 1, 2, 3, 4});
+  CHECK(tiny.view().at(id).observations == observations);
+  CHECK(tiny.map.drop_features(KeyframeId(7)).empty());
+
+  MapEdit stale;  // by the indices of before
+  stale.erased_observations = {{LandmarkId(4), {id, 4}}, {LandmarkId(3), {id, 2}}};
+  tiny.map.apply(stale);
+  CHECK_FALSE(tiny.view().at(id).landmarks[1].valid());
+  CHECK(tiny.view().at(id).landmarks[4] == LandmarkId(3));  // was never at a lower index
+  CHECK(tiny.consistent());
+  stale.erased_observations = {{LandmarkId(4), {id, 10}}};
+  CHECK_THROWS_AS(tiny.map.apply(stale), std::logic_error);
+}
+
 TEST_CASE("A keyframe is found by its frame until it is erased") {
   TinyMap tiny(true);
   CHECK(tiny.view().newest_frame_index(CameraId(0)) == -1);

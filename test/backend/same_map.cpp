@@ -20,13 +20,14 @@ bool same_frame(const FrameObservations& a, const FrameObservations& b) {
          a.features.kind == b.features.kind &&
          same_bits(a.features.keypoints, b.features.keypoints) &&
          same_bits(a.features.descriptors, b.features.descriptors) &&
-         same_bits(a.u_right, b.u_right);
+         same_bits(a.u_right, b.u_right) && a.dropped == b.dropped;
 }
 
 bool same_odometry(const Odometry* a, const Odometry* b) {
   if (a == nullptr || b == nullptr) return a == b;
   return a->previous == b->previous && a->motion.b_from_a.params == b->motion.b_from_a.params &&
-         a->motion.covariance == b->motion.covariance && a->keypoints == b->keypoints;
+         a->motion.covariance == b->motion.covariance && a->keypoints == b->keypoints &&
+         a->dropped == b->dropped;
 }
 
 bool same_keyframe(const Keyframe& a, const Keyframe& b) {

@@ -32,6 +32,7 @@ void RandomEdits::step() {
       break;
     case 6:
       if (random_.below(20) == 0) edit.erased_keyframes.push_back(keyframe());
+      if (random_.below(40) == 0) filled_.map.drop_features(keyframe());
       break;
     case 7:
       if (random_.below(20) == 0) add_keyframe();
@@ -53,6 +54,7 @@ Observation RandomEdits::observation() {
   const KeyframeId id = keyframe();
   const Keyframe* found = filled_.map.view().find(id);
   const std::size_t keypoints = found == nullptr ? 1 : found->landmarks.size();
+  if (keypoints == 0) return observation();  // all were dropped
   return {id, static_cast<std::uint32_t>(random_.below(keypoints))};
 }
 
@@ -64,7 +66,7 @@ LandmarkObservation RandomEdits::existing() {
 
 void RandomEdits::add_keyframe() {
   const Keyframe* like = filled_.map.view().find(keyframe());
-  if (like == nullptr) return;
+  if (like == nullptr || like->landmarks.size() < 3) return;
   NewKeyframe made{like->observations, like->cam_from_world, like->landmarks, {}, keyframe()};
   for (LandmarkId& id : made.landmarks) {
     if (random_.below(3) == 0) id = landmark();

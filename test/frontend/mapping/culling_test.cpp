@@ -53,6 +53,44 @@ std::vector<std::uint32_t> values(const std::vector<LandmarkId>& ids) {
   return result;
 }
 
+TEST_CASE("Keyframes go out of use when the newest ones share few landmarks with them") {
+  SyntheticSceneOptions scene;
+  scene.trajectory = SceneTrajectory::kCorridor;
+  scene.times = 80;
+  scene.step = 3;
+  const FilledMap filled = fill_map(make_synthetic_scene(scene), {});
+  const MapSnapshot& map = filled.map.view();
+  const auto shared = [&](KeyframeId a, KeyframeId b) {
+    int count = 0;
+    for (const LandmarkId id : map.at(a).landmarks) {
+      const auto& others = map.at(b).landmarks;
+      count += id.valid() && std::count(others.begin(), others.end(), id) > 0 ? 1 : 0;
+    }
+    return count;
+  };
+  const std::vector<KeyframeId>& ids = filled.keyframes;
+  for (const std::size_t full : {std::size_t{1}, std::size_t{5}}) {
+    std::vector<KeyframeId> expected;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      bool used = i + full >= ids.size();
+      for (std::size_t j = ids.size() - full; j < ids.size(); ++j) {
+        used = used || shared(ids[i], ids[j]) >= 15;
+      }
+      if (!used) expected.push_back(ids[i]);
+    }
+    CHECK(expected.size() > ids.size() / 2);
+    CHECK(expected.size() < ids.size() - full);
+    CullingOptions options;
+    options.full_keyframes = static_cast<int>(full);
+    KeyframeUse use(options, map);
+    CHECK(use.gone_out(map) == expected);
+    CHECK(use.gone_out(map).empty());  // nothing more has gone
+  }
+  CullingOptions options;
+  options.full_keyframes = 0;
+  CHECK(KeyframeUse(options, map).gone_out(map).empty());
+}
+
 TEST_CASE("A landmark must be seen again within two keyframes") {
   ProbationMap made;
   LandmarkProbation probation{CullingOptions()};

@@ -66,7 +66,6 @@ void check_equal(const KeyframeDatabase& database, const KeyframeDatabase& fresh
     REQUIRE(database.contains(id) == fresh.contains(id));
     if (!fresh.contains(id)) continue;
     REQUIRE(database.bow_of(id) == fresh.bow_of(id));
-    REQUIRE(database.index_of(id) == fresh.index_of(id));
   }
 }
 
@@ -86,7 +85,6 @@ TEST_CASE("A database of keyframes follows the map") {
   CHECK(places.size() == orbit.map().keyframe_count());
   CHECK(best() != before);
   CHECK(!places.contains(before));
-  CHECK_THROWS_AS(places.index_of(before), std::out_of_range);
   CHECK_THROWS_AS(places.bow_of(before), std::out_of_range);
 }
 

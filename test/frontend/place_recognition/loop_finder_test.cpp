@@ -72,7 +72,7 @@ int loops_of(const std::vector<LoopProposal>& proposals) {
 
 TEST_CASE("A loop that only misses a neighbour is one when the next keyframe confirms it") {
   SecondLap lap;
-  LoopFinder finder(scene_vocabulary(lap.scene), {});
+  LoopFinder finder(std::make_shared<KeyframeDatabase>(scene_vocabulary(lap.scene)), {});
   const auto alone = finder.find(lap.filled.map.view(), lap.first());
   REQUIRE(!alone.empty());
   CHECK(loops_of(alone) == 0);
@@ -101,7 +101,7 @@ TEST_CASE("A loop that only misses a neighbour is one when the next keyframe con
 
 TEST_CASE("A next keyframe that sees another place confirms nothing") {
   SecondLap lap;
-  LoopFinder finder(scene_vocabulary(lap.scene), {});
+  LoopFinder finder(std::make_shared<KeyframeDatabase>(scene_vocabulary(lap.scene)), {});
   REQUIRE(!finder.find(lap.filled.map.view(), lap.first()).empty());
   CHECK(loops_of(finder.find(lap.filled.map.view(), lap.add_next(0))) == 0);
 }
@@ -109,7 +109,7 @@ TEST_CASE("A next keyframe that sees another place confirms nothing") {
 TEST_CASE("What the map has lost is not looked at again") {
   for (const bool lose_keyframe : {true, false}) {
     SecondLap lap;
-    LoopFinder finder(scene_vocabulary(lap.scene), {});
+    LoopFinder finder(std::make_shared<KeyframeDatabase>(scene_vocabulary(lap.scene)), {});
     const auto alone = finder.find(lap.filled.map.view(), lap.first());
     REQUIRE(!alone.empty());
     const KeyframeId next = lap.add_next(8);

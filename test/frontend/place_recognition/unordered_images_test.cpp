@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <random>
 #include <string>
 
@@ -113,7 +114,7 @@ TEST_CASE("Of a thousand unordered seafloor images none is taken for another", "
   sift_options.max_features = 1000;
   const auto sift = make_sift(sift_options);
   PlaneMap map;
-  LoopFinder finder(default_vocabulary(), {});
+  LoopFinder finder(std::make_shared<KeyframeDatabase>(default_vocabulary()), {});
   std::vector<FeatureSet> all;
   int proposed = 0, accepted = 0, wrong = 0;
   for (const std::string& path : images) {

@@ -70,9 +70,9 @@ TEST_CASE("Guided matches of a keyframe are nearly all that brute force finds") 
   const KeyframeId keyframe = circle.filled.keyframes[5];  // frame 10
   const FeatureSet& features = circle.features(11);
   const auto all = match_keyframe(circle.map(), keyframe, features, 0.75, 0.7);
-  const auto guided =
-      match_keyframe_guided(circle.map(), keyframe, circle.places->index_of(keyframe), features,
-                            circle.places->words_of(features).index, 0.75, 0.7);
+  const auto guided = match_keyframe_guided(
+      circle.map(), keyframe, circle.places->index_of(circle.map().at(keyframe)), features,
+      circle.places->words_of(features).index, 0.75, 0.7);
   REQUIRE(guided.size() == features.size());
   int found = 0, both = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
