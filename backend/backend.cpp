@@ -106,7 +106,7 @@ BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
   if (options_.local_method == LocalMethod::kBundle) {
     return take_in(solve_bundle(view(), make_local_bundle(view(), newest, options_.local), stop));
   }
-  return take_in(smoother().update(snapshot(), newest));
+  return take_in(smoother().update(snapshot(), newest, stop));
 }
 
 // The oldest.

@@ -65,8 +65,8 @@ class Backend {
   void drop_features(const std::vector<KeyframeId>& keyframes);
 
   // Improves the map after the newest keyframe was added, by the method of the options; outlier
-  // observations are erased from the map. Bundle adjustment looks at `stop` between iterations and
-  // keeps what it has when stopped; an incremental update is short.
+  // observations are erased from the map. Looks at `stop` between iterations and keeps what it has
+  // when stopped.
   BundleSummary optimize_local(KeyframeId newest, std::stop_token stop = {});
 
   // Closes a loop: the loop graph moves every keyframe, landmarks follow, those of the two sides

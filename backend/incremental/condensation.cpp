@@ -286,7 +286,10 @@ void IncrementalSolver::condense(const std::vector<std::uint32_t>& points,
   condensed_ids_[index] = id;
   for (const std::uint32_t point : points) condensed_in_[point] = index;
   condensed_count_ += points.size();
-  for (const std::uint32_t v : all_variables_of_term(id)) link(v, id);
+  for (const std::uint32_t v : all_variables_of_term(id)) {
+    link(v, id);
+    variables_[v].terms.shrink_to_fit();
+  }
   evaluate(id);
 }
 

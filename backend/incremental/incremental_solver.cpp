@@ -250,7 +250,7 @@ UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
   }
   for (int i = 0; i < options_.max_steps; ++i) {
     if (dirty_.empty() && touched_.empty() && damped_.empty() && !to_solve) break;
-    summary.stopped = stop.stop_requested();
+    summary.stopped = i > 0 && stop.stop_requested();
     if (summary.stopped) break;
     to_solve = false;
     step(summary);

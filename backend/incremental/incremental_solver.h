@@ -128,8 +128,8 @@ class IncrementalSolver final : private TermSource {
   // these variables to the root, of a point from all that see it.
   Eigen::MatrixXd covariance(const std::vector<GraphVariable>& variables) const;
 
-  // Takes in what was added and removed since the last update. Looks at `stop` between steps; what
-  // was left to do then waits for the next update.
+  // Takes in what was added and removed since the last update. Looks at `stop` between steps, so
+  // that every update makes one; what was left to do then waits for the next update.
   UpdateSummary update(const std::stop_token& stop = {});
 
   Rigid3d pose(std::uint32_t index) const;

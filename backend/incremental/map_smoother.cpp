@@ -33,7 +33,8 @@ std::string MapSmootherOptions::validate() const {
 MapSmoother::MapSmoother(const MapSmootherOptions& options)
     : options_(options), solver_(options.solver) {}
 
-BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest) {
+BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
+                                 const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
   follow_moves(*map);
   take_in_keyframes(*map, newest);
@@ -42,7 +43,7 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
       known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
   for (const LandmarkId id : changed) take_in_landmark(*map, id);
   take_in_odometry(*map);
-  const UpdateSummary updated = solver_.update();
+  const UpdateSummary updated = solver_.update(stop);
 
   forget_marginalized(*map, updated.marginalized);
   BundleResult result;

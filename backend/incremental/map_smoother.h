@@ -44,7 +44,9 @@ class MapSmoother {
   // The map as it is now, with `newest` in it. The result holds what moved, and as outliers the
   // observations beyond their threshold of the landmarks that `newest` sees: they are out of the
   // smoother's problem, and the map is to follow.
-  BundleResult update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest);
+  // `stop`: see IncrementalSolver::update.
+  BundleResult update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
+                      const std::stop_token& stop = {});
 
   const IncrementalSolver& solver() const { return solver_; }
 

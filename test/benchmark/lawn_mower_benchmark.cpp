@@ -42,21 +42,23 @@ int run(int keyframes, int window, bool compare) {
   const std::size_t block = std::max<std::size_t>(1, static_cast<std::size_t>(keyframes) / 10);
   std::vector<double> times;
   std::size_t relinearized = 0;
-  std::printf("keyframes  mean ms   max ms  solver MB  relinearized  pending\n");
+  std::size_t moved = 0;
+  std::printf("keyframes  mean ms   max ms  solver MB  relinearized  moved  pending\n");
   while (!feed.done()) {
     feed.add_next();
     const double start = cpu_milliseconds();
     const UpdateSummary summary = feed.solver().update();
     times.push_back(cpu_milliseconds() - start);
     relinearized += summary.relinearized;
+    moved += summary.moved.size();
     if (times.size() % block != 0) continue;
     const auto first = times.end() - static_cast<std::ptrdiff_t>(block);
-    std::printf("%9zu %8.2f %8.2f %10.1f %13zu %8zu\n", times.size(),
+    std::printf("%9zu %8.2f %8.2f %10.1f %13zu %6zu %8zu\n", times.size(),
                 std::accumulate(first, times.end(), 0.0) / static_cast<double>(block),
                 *std::max_element(first, times.end()), allocated_megabytes() - before,
-                relinearized / block, summary.pending);
+                relinearized / block, moved / block, summary.pending);
     std::fflush(stdout);
-    relinearized = 0;
+    relinearized = moved = 0;
   }
   if (compare) std::printf("cost above batch: %.3g\n", excess(feed.solver()));
   return 0;

@@ -211,24 +211,24 @@ TEST_CASE("judged steps: a pivot that is rounding is none, whatever its sign") {
   }
 }
 
-TEST_CASE("judged steps: a stop leaves what is to be done to the next update") {
+TEST_CASE("judged steps: a stop after one leaves the rest to the next update") {
   FactorGraph graph = arc(6);
   disturb(graph, 0.02, 0.01, 0.05, 3);
   GraphFeed stopped(graph, {});
   GraphFeed plain(graph, {});
   std::stop_source source;
   source.request_stop();
+  int stops = 0;
   while (!plain.done()) {
-    plain.feed_next();
+    const bool one_is_enough = plain.feed_next().steps <= 1;
     stopped.add_next();
-    const FactorGraph before = stopped.solver().graph();
     const UpdateSummary summary = stopped.solver().update(source.get_token());
-    CHECK(summary.stopped);
-    CHECK(summary.steps == 0);
-    CHECK(stopped.solver().graph().frames.back().cam_from_world.params ==
-          before.frames.back().cam_from_world.params);
+    CHECK(summary.steps <= 1);
+    CHECK((summary.stopped || one_is_enough));
+    stops += summary.stopped ? 1 : 0;
     CHECK_FALSE(stopped.solver().update().stopped);
   }
+  CHECK(stops > 0);
   CHECK(stopped.solver().cost() == Approx(plain.solver().cost()).epsilon(1e-3));
 }
 
