@@ -54,8 +54,8 @@ std::vector<double> IncrementalSolver::shape_change(const CondensedTerm& term) c
   return change;
 }
 
-IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_t index) const {
-  const CondensedTerm& term = condensed_[index];
+IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_t index) {
+  CondensedTerm& term = condensed_[index];
   Evaluation result;
   if (term.members.empty()) return result;
   const Eigen::VectorXd moved = deltas_of(term.poses) - term.at;
@@ -64,6 +64,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_
   result.cost = std::max(result.squared_norm + term.loss_excess, 0.0);
   result.rows = term.rows;
   const std::vector<double> change = shape_change(term);
+  term.change = *std::max_element(change.begin(), change.end());
   for (std::size_t i = 0; i < change.size(); ++i) {
     const CondensedTerm::Reach& reach = term.reach[i];
     if (reach.by_turn > 0) {
@@ -112,10 +113,7 @@ LandmarkTerm IncrementalSolver::linearized_landmark(std::uint32_t point) const {
 Eigen::Vector3d IncrementalSolver::condensed_point(std::uint32_t point) const {
   const CondensedTerm& term = condensed_[condensed_in_[point]];
   const CondensedTerm::Member& of = term.members[member_of(point)];
-  const std::vector<double> change = shape_change(term);
-  if (std::none_of(change.begin(), change.end(), [](double by) { return by > kStill; })) {
-    return inverse(pose_at(of.anchor)) * of.in_anchor;
-  }
+  if (!(term.change > kStill)) return inverse(pose_at(of.anchor)) * of.in_anchor;
   const LandmarkTerm landmark = linearized_landmark(point);
   if (!landmark.solvable) return landmark.base;
   return landmark.base + displacement(landmark);

@@ -42,6 +42,9 @@ struct CondensedTerm {
   double loss_excess = 0;            // what the losses make of that, beyond it
   int rows = 0;
   std::vector<Reach> reach;  // by pose
+  // How far the views are from what they would be if the poses had moved together since, when that
+  // was looked at last: the most, in standard deviations of an observation.
+  double change = 0;
 
   // Empties what sums up, for these poses with these deltas.
   void begin(std::vector<std::uint32_t> poses, Eigen::VectorXd deltas);

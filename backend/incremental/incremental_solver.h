@@ -262,7 +262,7 @@ class IncrementalSolver final : private TermSource {
   Evaluation evaluate_edge(std::uint32_t index) const;
   Evaluation evaluate_landmark(std::uint32_t index) const;
   Evaluation evaluate_prior(std::uint32_t index) const;
-  Evaluation evaluate_condensed(std::uint32_t index) const;
+  Evaluation evaluate_condensed(std::uint32_t index);
   Evaluation evaluate_rows(std::uint32_t factor) const;
   void evaluate_factor_view(const FactorView& view, const Eigen::Vector3d& at,
                             const Eigen::Vector3d& displacement, Evaluation& result) const;
