@@ -17,7 +17,7 @@ constexpr std::size_t kMostPoses = 16;
 
 // Condensed landmarks keep their place before their anchor while the poses that see them have not
 // moved against one another by more than this, in standard deviations of an observation.
-constexpr double kStill = 0.05;
+constexpr double kStill = 0.02;
 
 }  // namespace
 
@@ -33,16 +33,17 @@ Eigen::VectorXd IncrementalSolver::deltas_of(const std::vector<std::uint32_t>& p
 }
 
 // How far a view of each pose is, in standard deviations of an observation, from what it would be
-// if the poses had moved together since the term was made. A turn by t moves what is seen by
+// if the poses had moved together since they had these deltas. A turn by t moves what is seen by
 // |derivative| t, and by a part t of that in second order; a way counts by the turn that it looks
 // like.
-std::vector<double> IncrementalSolver::shape_change(const CondensedTerm& term) const {
+std::vector<double> IncrementalSolver::shape_change(const CondensedTerm& term,
+                                                    const Eigen::VectorXd& since) const {
   std::vector<double> change;
   Vector6d common = Vector6d::Zero();
   for (std::size_t i = 0; i < term.poses.size(); ++i) {
     const WorldTangent& tangent = pose_with(term.poses[i]).tangent;
     const Vector6d moved =
-        tree_.delta(term.poses[i]) - term.at.segment<6>(static_cast<Eigen::Index>(6 * i));
+        tree_.delta(term.poses[i]) - since.segment<6>(static_cast<Eigen::Index>(6 * i));
     const Vector6d xi = tangent.at_origin(moved);
     if (i == 0 && !term.is_held) common = xi;
     const Vector6d own = tangent.increment(xi - common);
@@ -63,8 +64,12 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_
       std::max(term.squared_norm + moved.dot(2 * term.gradient + term.times(moved)), 0.0);
   result.cost = std::max(result.squared_norm + term.loss_excess, 0.0);
   result.rows = term.rows;
-  const std::vector<double> change = shape_change(term);
-  term.change = *std::max_element(change.begin(), change.end());
+  const std::vector<double> since_placed = shape_change(term, term.placed);
+  if (!term.is_stale && *std::max_element(since_placed.begin(), since_placed.end()) > kStill) {
+    term.is_stale = true;
+    stale_.push_back(index);
+  }
+  const std::vector<double> change = shape_change(term, term.at);
   for (std::size_t i = 0; i < change.size(); ++i) {
     const CondensedTerm::Reach& reach = term.reach[i];
     if (reach.by_turn > 0) {
@@ -113,10 +118,24 @@ LandmarkTerm IncrementalSolver::linearized_landmark(std::uint32_t point) const {
 Eigen::Vector3d IncrementalSolver::condensed_point(std::uint32_t point) const {
   const CondensedTerm& term = condensed_[condensed_in_[point]];
   const CondensedTerm::Member& of = term.members[member_of(point)];
-  if (!(term.change > kStill)) return inverse(pose_at(of.anchor)) * of.in_anchor;
-  const LandmarkTerm landmark = linearized_landmark(point);
-  if (!landmark.solvable) return landmark.base;
-  return landmark.base + displacement(landmark);
+  return inverse(pose_at(of.anchor)) * of.in_anchor;
+}
+
+// Minimises the points of stale terms over their observations, with their poses where they are.
+void IncrementalSolver::place_points() {
+  for (const std::uint32_t index : std::exchange(stale_, {})) {
+    CondensedTerm& term = condensed_[index];
+    if (!term.is_stale) continue;
+    for (std::size_t i = 0; i < term.members.size(); ++i) {
+      LandmarkTerm landmark = taken_out(term, i);
+      linearize(landmark, landmark.base);
+      if (!landmark.solvable) continue;
+      CondensedTerm::Member& of = term.members[i];
+      of.in_anchor = pose_at(of.anchor) * (landmark.base + displacement(landmark));
+    }
+    term.placed = deltas_of(term.poses);
+    term.is_stale = false;
+  }
 }
 
 // Makes a condensed term anew from its observations.

@@ -20,7 +20,9 @@ void CondensedTerm::begin(std::vector<std::uint32_t> of, Eigen::VectorXd deltas)
   gradient = Eigen::VectorXd::Zero(at.size());
   reach.assign(poses.size(), {});
   is_held = false;
-  squared_norm = loss_excess = change = 0;
+  placed = at;
+  is_stale = false;
+  squared_norm = loss_excess = 0;
   rows = 0;
 }
 

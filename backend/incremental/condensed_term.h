@@ -42,9 +42,8 @@ struct CondensedTerm {
   double loss_excess = 0;            // what the losses make of that, beyond it
   int rows = 0;
   std::vector<Reach> reach;  // by pose
-  // How far the views are from what they would be if the poses had moved together since, when that
-  // was looked at last: the most, in standard deviations of an observation.
-  double change = 0;
+  Eigen::VectorXd placed;    // the poses' deltas when the members' points were minimised
+  bool is_stale = false;     // its views have changed since, so that they are to be once more
 
   // Empties what sums up, for these poses with these deltas.
   void begin(std::vector<std::uint32_t> poses, Eigen::VectorXd deltas);

@@ -265,6 +265,7 @@ UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
     summary.marginalized = slide_window();
     condense_old();
   }
+  place_points();
   summary.pending = pending_.size();
   return summary;
 }

@@ -301,7 +301,8 @@ class IncrementalSolver final : private TermSource {
   LandmarkTerm& live(std::uint32_t point);
   double linearize_condensed(std::uint32_t index);
   Eigen::VectorXd deltas_of(const std::vector<std::uint32_t>& poses) const;
-  std::vector<double> shape_change(const CondensedTerm& term) const;
+  std::vector<double> shape_change(const CondensedTerm& term, const Eigen::VectorXd& since) const;
+  void place_points();
   LandmarkTerm taken_out(const CondensedTerm& term, std::size_t member) const;
   std::size_t member_of(std::uint32_t point) const;
   LandmarkTerm linearized_landmark(std::uint32_t point) const;
@@ -341,6 +342,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<CondensedTerm> condensed_;
   std::vector<std::uint32_t> condensed_ids_;  // the term of each
   std::vector<std::uint32_t> free_condensed_;
+  std::vector<std::uint32_t> stale_;  // condensed terms
   std::vector<std::uint32_t> free_terms_;
   std::size_t next_condensation_ = 0;  // at so many poses
   std::size_t condensed_count_ = 0;    // points
