@@ -314,6 +314,7 @@ void fields_of(S section, BackendOptions& options) {
               options.local_method)
       .field("window", options.incremental.solver.window)
       .field("budget", options.incremental.solver.budget)
+      .field("condense_after", options.incremental.solver.condense_after)
       .refuse_unknown();
 }
 

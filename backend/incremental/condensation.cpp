@@ -103,8 +103,10 @@ LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t
 std::size_t IncrementalSolver::member_of(std::uint32_t point) const {
   const std::vector<CondensedTerm::Member>& members = condensed_[condensed_in_[point]].members;
   return static_cast<std::size_t>(
-      std::find_if(members.begin(), members.end(),
-                   [&](const CondensedTerm::Member& of) { return of.landmark == point; }) -
+      std::lower_bound(members.begin(), members.end(), point,
+                       [](const CondensedTerm::Member& of, std::uint32_t wanted) {
+                         return of.landmark < wanted;
+                       }) -
       members.begin());
 }
 
@@ -266,8 +268,9 @@ void IncrementalSolver::condense_old() {
   if (!points.empty()) condense(points, poses);
 }
 
-void IncrementalSolver::condense(const std::vector<std::uint32_t>& points,
+void IncrementalSolver::condense(std::vector<std::uint32_t> points,
                                  const std::vector<std::uint32_t>& poses) {
+  std::sort(points.begin(), points.end());
   CondensedTerm made;
   made.begin(poses, deltas_of(poses));
   for (const std::uint32_t point : points) {

@@ -31,7 +31,7 @@ struct CondensedTerm {
     int views = 0;
   };
 
-  std::vector<Member> members;
+  std::vector<Member> members;  // ascending
   std::vector<std::uint32_t> observations;
   std::vector<std::uint32_t> poses;  // that vary
   bool is_held = false;              // by a view of a fixed pose

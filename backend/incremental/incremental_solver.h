@@ -295,7 +295,7 @@ class IncrementalSolver final : private TermSource {
   // backend/incremental/condensation.cpp
   void condense_old();
   bool is_old(std::uint32_t point, std::uint32_t recent);
-  void condense(const std::vector<std::uint32_t>& points, const std::vector<std::uint32_t>& poses);
+  void condense(std::vector<std::uint32_t> points, const std::vector<std::uint32_t>& poses);
   void take_apart(std::uint32_t index);
   void take_apart(const std::vector<std::uint32_t>& terms);
   LandmarkTerm& live(std::uint32_t point);
