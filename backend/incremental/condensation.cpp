@@ -17,7 +17,7 @@ constexpr std::size_t kMostPoses = 16;
 
 // Condensed landmarks keep their place before their anchor while the poses that see them have not
 // moved against one another by more than this, in standard deviations of an observation.
-constexpr double kStill = 0.02;
+constexpr double kStill = 0.05;
 
 }  // namespace
 
@@ -64,10 +64,9 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_
       std::max(term.squared_norm + moved.dot(2 * term.gradient + term.times(moved)), 0.0);
   result.cost = std::max(result.squared_norm + term.loss_excess, 0.0);
   result.rows = term.rows;
-  const std::vector<double> since_placed = shape_change(term, term.placed);
-  if (!term.is_stale && *std::max_element(since_placed.begin(), since_placed.end()) > kStill) {
-    term.is_stale = true;
-    stale_.push_back(index);
+  if (!term.is_stale) {
+    const std::vector<double> since_placed = shape_change(term, term.placed);
+    term.is_stale = *std::max_element(since_placed.begin(), since_placed.end()) > kStill;
   }
   const std::vector<double> change = shape_change(term, term.at);
   for (std::size_t i = 0; i < change.size(); ++i) {
@@ -120,24 +119,26 @@ LandmarkTerm IncrementalSolver::linearized_landmark(std::uint32_t point) const {
 Eigen::Vector3d IncrementalSolver::condensed_point(std::uint32_t point) const {
   const CondensedTerm& term = condensed_[condensed_in_[point]];
   const CondensedTerm::Member& of = term.members[member_of(point)];
-  return inverse(pose_at(of.anchor)) * of.in_anchor;
+  if (!term.is_stale) return inverse(pose_at(of.anchor)) * of.in_anchor;
+  const LandmarkTerm landmark = linearized_landmark(point);
+  if (!landmark.solvable) return landmark.base;
+  return landmark.base + displacement(landmark);
 }
 
-// Minimises the points of stale terms over their observations, with their poses where they are.
-void IncrementalSolver::place_points() {
-  for (const std::uint32_t index : std::exchange(stale_, {})) {
-    CondensedTerm& term = condensed_[index];
-    if (!term.is_stale) continue;
-    for (std::size_t i = 0; i < term.members.size(); ++i) {
-      LandmarkTerm landmark = taken_out(term, i);
-      linearize(landmark, landmark.base);
-      if (!landmark.solvable) continue;
-      CondensedTerm::Member& of = term.members[i];
-      of.in_anchor = pose_at(of.anchor) * (landmark.base + displacement(landmark));
-    }
-    term.placed = deltas_of(term.poses);
-    term.is_stale = false;
+// The points of its term are minimised over their observations, with the poses where they are.
+void IncrementalSolver::place(std::uint32_t point) {
+  if (condensed_in_.at(point) == kNone) return;
+  CondensedTerm& term = condensed_[condensed_in_[point]];
+  if (!term.is_stale) return;
+  for (std::size_t i = 0; i < term.members.size(); ++i) {
+    LandmarkTerm landmark = taken_out(term, i);
+    linearize(landmark, landmark.base);
+    if (!landmark.solvable) continue;
+    CondensedTerm::Member& of = term.members[i];
+    of.in_anchor = pose_at(of.anchor) * (landmark.base + displacement(landmark));
   }
+  term.placed = deltas_of(term.poses);
+  term.is_stale = false;
 }
 
 // Makes a condensed term anew from its observations.

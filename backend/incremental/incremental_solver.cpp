@@ -265,7 +265,6 @@ UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
     summary.marginalized = slide_window();
     condense_old();
   }
-  place_points();
   summary.pending = pending_.size();
   return summary;
 }

@@ -134,6 +134,9 @@ class IncrementalSolver final : private TermSource {
 
   Rigid3d pose(std::uint32_t index) const;
   Eigen::Vector3d point(std::uint32_t index) const;
+  // Changes no estimate: makes point() fast for this one and those condensed with it, as long as
+  // the poses that see them keep their shape.
+  void place(std::uint32_t point);
   Eigen::VectorXd block(std::uint32_t index) const;
   std::size_t pose_count() const { return poses_.size(); }
   std::size_t condensed_count() const { return condensed_count_; }  // points
@@ -302,7 +305,6 @@ class IncrementalSolver final : private TermSource {
   double linearize_condensed(std::uint32_t index);
   Eigen::VectorXd deltas_of(const std::vector<std::uint32_t>& poses) const;
   std::vector<double> shape_change(const CondensedTerm& term, const Eigen::VectorXd& since) const;
-  void place_points();
   LandmarkTerm taken_out(const CondensedTerm& term, std::size_t member) const;
   std::size_t member_of(std::uint32_t point) const;
   LandmarkTerm linearized_landmark(std::uint32_t point) const;
@@ -342,7 +344,6 @@ class IncrementalSolver final : private TermSource {
   std::vector<CondensedTerm> condensed_;
   std::vector<std::uint32_t> condensed_ids_;  // the term of each
   std::vector<std::uint32_t> free_condensed_;
-  std::vector<std::uint32_t> stale_;  // condensed terms
   std::vector<std::uint32_t> free_terms_;
   std::size_t next_condensation_ = 0;  // at so many poses
   std::size_t condensed_count_ = 0;    // points

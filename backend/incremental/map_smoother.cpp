@@ -218,7 +218,7 @@ void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
 
 // The keyframes that moved, and the landmarks that they and the newest one see.
 void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
-                                 KeyframeId newest, BundleResult& result) const {
+                                 KeyframeId newest, BundleResult& result) {
   std::vector<LandmarkId> seen = map.at(newest).landmarks;
   for (const std::uint32_t pose : moved) {
     const Keyframe* keyframe = map.find(keyframe_of_[pose]);
@@ -233,6 +233,7 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
   for (const LandmarkId id : seen) {
     const auto found = landmarks_.find(id);
     if (found == landmarks_.end()) continue;
+    solver_.place(found->second.point);
     const Eigen::Vector3d estimate = solver_.point(found->second.point);
     if (estimate.allFinite()) result.point_in_world.emplace_back(id, estimate);
   }

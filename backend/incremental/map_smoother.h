@@ -84,7 +84,7 @@ class MapSmoother {
                                 const Observation& seen);
   void set_outliers_aside(const MapSnapshot& map, KeyframeId newest, BundleResult& result);
   void write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
-                      KeyframeId newest, BundleResult& result) const;
+                      KeyframeId newest, BundleResult& result);
   void forget_marginalized(const MapSnapshot& map, const std::vector<std::uint32_t>& poses);
 
   MapSmootherOptions options_;
