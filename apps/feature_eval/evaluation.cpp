@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "apps/feature_eval/pictures.h"
-#include "apps/pipeline/parallel_for.h"
+#include "apps/slam/parallel_for.h"
 #include "cameras/output_file.h"
 #include "frontend/input/image_file.h"
 

@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 Json times_json(const StageTimes& times) {
   Json json = {{"total_ms", 0}, {"stages", Json::object()}};
   for (const auto& [stage, durations] : times.stages()) {
-    (stage == kTotal ? json["total_ms"] : json["stages"][stage]) = percentile(durations, 50);
+    (stage == kTotal ? json["total_ms"] : json["stages"][stage]) = percentile(durations.kept(), 50);
   }
   return json;
 }

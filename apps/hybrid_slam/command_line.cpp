@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
-#include "apps/pipeline/parallel_for.h"
+#include "apps/slam/parallel_for.h"
 
 namespace hybrid_slam {
 namespace {
@@ -73,8 +73,8 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       {"auto", TruthConvention::kAuto},
       {"world_from_cam", TruthConvention::kWorldFromCam},
       {"cam_from_world", TruthConvention::kCamFromWorld}};
-  const std::map<std::string, RunMode> modes{{"every-frame", RunMode::kEveryFrame},
-                                             {"realtime", RunMode::kRealtime}};
+  const std::map<std::string, SessionMode> modes{{"every-frame", SessionMode::kEveryFrame},
+                                                 {"realtime", SessionMode::kRealtime}};
 
   CLI::App app(
       "Visual SLAM on a sequence of stereo images, and those of a fisheye that moves by itself.",
@@ -136,7 +136,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
   try {
     app.parse(argc, argv);
-    if (line.rate > 0 && line.mode != RunMode::kRealtime) {
+    if (line.rate > 0 && line.mode != SessionMode::kRealtime) {
       throw CLI::ValidationError("--rate needs --mode realtime");
     }
     if (line.localize && line.map.empty()) {

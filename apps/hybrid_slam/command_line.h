@@ -4,13 +4,12 @@
 #include <optional>
 #include <string>
 
-#include "apps/pipeline/slam_options.h"
+#include "apps/slam/session_types.h"
+#include "apps/slam/slam_options.h"
 #include "frontend/features/sift_device.h"
 #include "frontend/input/image_sequence.h"
 
 namespace hybrid_slam {
-
-enum class RunMode { kEveryFrame, kRealtime };
 
 // What the user asked for.
 struct CommandLine {
@@ -20,7 +19,7 @@ struct CommandLine {
   SequenceCameras cameras = SequenceCameras::kAuto;
   TruthConvention truth_convention = TruthConvention::kAuto;
   std::string out = "out";
-  RunMode mode = RunMode::kEveryFrame;
+  SessionMode mode = SessionMode::kEveryFrame;
   double rate = 0;                       // [Hz]; 0: images wait for the pipeline
   int threads = 0;                       // 0: one per core
   SiftDevice device = SiftDevice::kCpu;  // that SIFT runs on

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "apps/pipeline/loop_closing.h"
+#include "apps/slam/loop_closing.h"
 
 namespace hybrid_slam {
 

@@ -8,7 +8,8 @@
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/io/progress_line.h"
-#include "apps/pipeline/interrupt.h"
+#include "apps/slam/interrupt.h"
+#include "apps/slam/replay.h"
 #include "backend/map/map_file.h"
 #include "backend/problem/solver_log.h"
 #include "cameras/input_error.h"
@@ -27,9 +28,9 @@ void make_output_folder(const std::string& folder) {
 }
 
 // What went wrong; the run goes on, and the older checkpoint is still there.
-std::string checkpoint(const CommandLine& line, const MapSnapshot& map) {
+std::string checkpoint(const CommandLine& line, const MapSnapshot& map, const MapFileInfo& info) {
   try {
-    write_map(line, map);
+    write_map(line, map, info);
   } catch (const OutputError& error) {
     return error.what();
   }
@@ -51,10 +52,10 @@ Map starting_map(const CommandLine& line) {
 }
 
 int run(CommandLine line, const Interrupt& interrupt) {
-  RunOptions options;
+  ReplayOptions options;
   Map map = starting_map(line);
   if (!line.vocabulary.empty()) {
-    options.vocabulary = load_vocabulary(line.vocabulary, DescriptorKind::kRootSift);
+    options.session.vocabulary = load_vocabulary(line.vocabulary, DescriptorKind::kRootSift);
   }
   const auto sequence =
       open_sequence(line.dataset, line.layout, line.sequence, line.cameras, line.truth_convention);
@@ -68,8 +69,8 @@ int run(CommandLine line, const Interrupt& interrupt) {
                  info.stereo.width, info.stereo.height, info.fisheye ? ", with a fisheye" : "");
   }
   ProgressLine progress("frames", line.quiet);
-  RunHooks hooks;
-  hooks.progress = [&](const RunProgress& state) {
+  ReplayHooks hooks;
+  hooks.progress = [&](const ReplayProgress& state) {
     progress.update(state.done, state.total,
                     fmt::format("lost {}  keyframes {}  landmarks {}", state.frames.lost,
                                 state.keyframes, state.landmarks));
@@ -79,24 +80,24 @@ int run(CommandLine line, const Interrupt& interrupt) {
     spdlog::warn(text);
   };
   hooks.cancelled = interrupt.token();
-  hooks.checkpoint = [&](const MapSnapshot& so_far) { return checkpoint(line, so_far); };
-  options.threads = line.threads;
+  SessionOptions& session = options.session;
+  session.mode = line.mode;
+  session.threads = line.threads;
+  session.device = line.device;
+  session.localize = line.localize;
+  session.checkpoint_every = line.checkpoint_every;
+  session.checkpoint = [&](const MapSnapshot& so_far, const MapFileInfo& info) {
+    return checkpoint(line, so_far, info);
+  };
   options.limit = line.limit;
   options.rate = line.rate;
-  options.checkpoint_every = line.checkpoint_every;
-  options.localize = line.localize;
 
   const auto start = std::chrono::steady_clock::now();
-  const UpsamplingEvidence upsampling = choose_upsampling(*sequence, line.options);
-  const ImageFrameSource source(*sequence, line.options, line.device);
   const RunResult result =
-      line.mode == RunMode::kRealtime
-          ? run_realtime(source, line.options, options, hooks, std::move(map))
-          : run_every_frame(source, line.options, options, hooks, std::move(map));
+      replay(ImageFrameSource(*sequence), line.options, std::move(options), hooks, std::move(map));
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   progress.finish();
-  const RunSummary summary =
-      write_outputs(line, sequence->info(), upsampling, result, elapsed.count());
+  const RunSummary summary = write_outputs(line, sequence->info(), result, elapsed.count());
   print_summary(line, result, summary);
   if (!result.internal_errors.empty()) {
     spdlog::critical(result.internal_errors.back());

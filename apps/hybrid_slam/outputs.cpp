@@ -8,10 +8,10 @@
 #include <numbers>
 
 #include "apps/hybrid_slam/loop_outputs.h"
-#include "apps/hybrid_slam/version.h"
 #include "apps/io/map_picture.h"
 #include "apps/io/ply.h"
 #include "apps/io/report.h"
+#include "apps/slam/version.h"
 #include "backend/map/map_file.h"
 #include "cameras/output_file.h"
 
@@ -111,9 +111,9 @@ Json count_by(const std::vector<FrameRecord>& records, Key key) {
   return counts;
 }
 
-Json options_json(const CommandLine& line, bool hybrid) {
+Json options_json(const CommandLine& line, const RunResult& result, bool hybrid) {
   const SlamOptions& options = line.options;
-  return {{"mode", line.mode == RunMode::kRealtime ? "realtime" : "every-frame"},
+  return {{"mode", line.mode == SessionMode::kRealtime ? "realtime" : "every-frame"},
           {"cameras", hybrid ? "hybrid" : "stereo"},
           {"features", options.features},
           {"threads", line.threads},
@@ -123,7 +123,7 @@ Json options_json(const CommandLine& line, bool hybrid) {
           {"map", line.map.empty() ? Json() : Json(line.map)},
           {"localize", line.localize},
           {"contrast_threshold", options.sift.contrast_threshold},
-          {"upsample", options.sift.upsample},
+          {"upsample", result.upsampled},
           {"refine_stereo", options.stereo.refine},
           {"refine_tracks", options.tracking.refinement.enabled}};
 }
@@ -152,8 +152,7 @@ Json to_json(const UpsamplingEvidence& evidence, bool upsample) {
           {"feature_size_mrad", 1e3 * evidence.feature_size}};
 }
 
-Json summary_json(const CommandLine& line, const SequenceInfo& sequence,
-                  const UpsamplingEvidence& upsampling, const RunResult& result,
+Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const RunResult& result,
                   const RunSummary& summary) {
   const FrameCounts& frames = result.frames;
   Json json;
@@ -181,8 +180,8 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence,
   json["ate"] = summary.ate ? to_json(*summary.ate) : Json();
   json["truth_convention"] =
       sequence.truth_convention.empty() ? Json() : Json(sequence.truth_convention);
-  json["upsampling"] = to_json(upsampling, line.options.sift.upsample);
-  json["options"] = options_json(line, sequence.fisheye.has_value());
+  json["upsampling"] = to_json(result.upsampling.value_or(UpsamplingEvidence()), result.upsampled);
+  json["options"] = options_json(line, result, sequence.fisheye.has_value());
   json["seed"] = line.options.seed;
   json["sift_engine"] = to_string(line.device);
   json["blas"] = blas_name();
@@ -200,15 +199,12 @@ void write_frame_times(const std::filesystem::path& path, const std::vector<Fram
 
 }  // namespace
 
-void write_map(const CommandLine& line, const MapSnapshot& map) {
-  save_map(
-      std::filesystem::path(line.out) / "map.hslam", map,
-      {fmt::format("hybrid_slam {} ({})", kVersion, kGitCommit), write_slam_options(line.options)});
+void write_map(const CommandLine& line, const MapSnapshot& map, const MapFileInfo& info) {
+  save_map(std::filesystem::path(line.out) / "map.hslam", map, info);
 }
 
 RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
-                         const UpsamplingEvidence& upsampling, const RunResult& result,
-                         double seconds) {
+                         const RunResult& result, double seconds) {
   const std::filesystem::path out = line.out;
   const Trajectories stereo = collect(result, result.records);
   const Trajectories fisheye = collect(result, result.fisheye_records);
@@ -228,9 +224,10 @@ RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
   write_loops(out / "loops.csv", result.loops);
   write_json(out / "timing.json", to_json(result.times));
   write_frame_times(out / "timing.csv", result.records);
-  write_json(out / "summary.json", summary_json(line, sequence, upsampling, result, summary));
+  write_json(out / "summary.json", summary_json(line, sequence, result, summary));
   if (!line.localize) {
-    write_map(line, *result.map);  // the largest: where the disk gets full, the others are there
+    write_map(line, *result.map,
+              result.file_info);  // the largest: where the disk gets full, the others are there
   }
   return summary;
 }

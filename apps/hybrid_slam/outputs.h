@@ -3,8 +3,7 @@
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/io/hybrid_error.h"
 #include "apps/io/trajectory.h"
-#include "apps/pipeline/slam_run.h"
-#include "apps/pipeline/upsampling.h"
+#include "apps/slam/replay.h"
 
 namespace hybrid_slam {
 
@@ -16,12 +15,11 @@ struct RunSummary {
 };
 
 // Writes the map into line.out. Throws OutputError.
-void write_map(const CommandLine& line, const MapSnapshot& map);
+void write_map(const CommandLine& line, const MapSnapshot& map, const MapFileInfo& info);
 
 // Writes every file of the run into line.out. Throws OutputError.
 RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
-                         const UpsamplingEvidence& upsampling, const RunResult& result,
-                         double seconds);
+                         const RunResult& result, double seconds);
 
 // A few lines for people.
 void print_summary(const CommandLine& line, const RunResult& result, const RunSummary& summary);

@@ -31,16 +31,14 @@ double percentile(std::vector<double> values, double percent) {
 Json to_json(const StageTimes& times) {
   Json json = Json::object();
   for (const auto& [stage, durations] : times.stages()) {
-    std::vector<double> sorted = durations;
+    std::vector<double> sorted = durations.kept();
     std::sort(sorted.begin(), sorted.end());
-    double sum = 0;
-    for (const double duration : sorted) sum += duration;
-    json[stage] = {{"count", sorted.size()},
-                   {"mean", sum / static_cast<double>(sorted.size())},
+    json[stage] = {{"count", durations.count()},
+                   {"mean", durations.mean()},
                    {"p50", percentile_of_sorted(sorted, 50)},
                    {"p95", percentile_of_sorted(sorted, 95)},
                    {"p99", percentile_of_sorted(sorted, 99)},
-                   {"max", sorted.back()}};
+                   {"max", durations.max()}};
   }
   return json;
 }

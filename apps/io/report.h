@@ -16,7 +16,8 @@ namespace hybrid_slam {
 // Smallest of the values, at least one, that `percent` of all do not exceed.
 double percentile(std::vector<double> values, double percent);
 
-// Per stage: count, mean, p50, p95, p99, max; durations in ms, percentiles by nearest rank.
+// Per stage: count, mean, p50, p95, p99, max; durations in ms, percentiles by nearest rank, of an
+// even sample where there are very many.
 nlohmann::ordered_json to_json(const StageTimes& times);
 
 // rmse, mean, median, max (all times `unit`), count.

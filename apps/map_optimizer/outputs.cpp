@@ -7,9 +7,9 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "apps/hybrid_slam/version.h"
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
+#include "apps/slam/version.h"
 #include "cameras/output_file.h"
 
 namespace hybrid_slam {

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 
-#include "apps/pipeline/parallel_for.h"
+#include "apps/slam/parallel_for.h"
 
 namespace hybrid_slam {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "apps/pipeline/parallel_for.h"
+#include "apps/slam/parallel_for.h"
 
 namespace hybrid_slam {
 

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "apps/io/progress_line.h"
-#include "apps/pipeline/parallel_for.h"
+#include "apps/slam/parallel_for.h"
 #include "apps/vocabulary_trainer/training_run.h"
 #include "cameras/input_error.h"
 #include "cameras/output_file.h"

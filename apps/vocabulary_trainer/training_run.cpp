@@ -5,7 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "apps/pipeline/parallel_for.h"
+#include "apps/slam/parallel_for.h"
 #include "cameras/input_error.h"
 #include "frontend/input/image_file.h"
 #include "frontend/place_recognition/descriptor_store.h"

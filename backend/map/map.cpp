@@ -56,10 +56,12 @@ void validate(const MapTables& tables, const MapEdit& edit) {
   }
 }
 
-void count(PersistentTable<Landmark>& landmarks, const std::vector<LandmarkId>& ids,
-           int Landmark::*counter) {
-  for (const LandmarkId id : ids) {
-    if (landmarks.find(id.value) != nullptr) ++(landmarks.edit(id.value).*counter);
+void count(PersistentTable<Landmark>& landmarks, const std::vector<LandmarkCount>& counted) {
+  for (const LandmarkCount& one : counted) {
+    if (landmarks.find(one.landmark.value) == nullptr) continue;
+    Landmark& landmark = landmarks.edit(one.landmark.value);
+    landmark.visible += one.visible;
+    landmark.found += one.found;
   }
 }
 
@@ -118,8 +120,7 @@ void Map::apply(const MapEdit& edit) {
   for (const LandmarkId id : edit.erased_landmarks) transaction.erase_landmark(id);
   for (const KeyframeId id : edit.erased_keyframes) transaction.erase_keyframe(id);
   transaction.commit();
-  count(tables.landmarks, edit.visible, &Landmark::visible);
-  count(tables.landmarks, edit.found, &Landmark::found);
+  count(tables.landmarks, edit.counted);
 }
 
 void Map::move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world,

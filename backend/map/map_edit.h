@@ -30,6 +30,13 @@ struct LandmarkMerge {
   LandmarkId drop;
 };
 
+// How often a landmark should have been seen by tracking, and was, since that was last told.
+struct LandmarkCount {
+  LandmarkId landmark;
+  int visible = 0;
+  int found = 0;
+};
+
 // A frame that becomes a keyframe: what tracking hands to the backend.
 struct NewKeyframe {
   std::shared_ptr<const FrameObservations> observations;
@@ -54,13 +61,12 @@ struct MapEdit {
   std::vector<LandmarkObservation> erased_observations;
   std::vector<LandmarkId> erased_landmarks;
   std::vector<KeyframeId> erased_keyframes;
-  std::vector<LandmarkId> visible;  // counted once each
-  std::vector<LandmarkId> found;
+  std::vector<LandmarkCount> counted;
 
   bool empty() const {
     return merged.empty() && new_observations.empty() && new_landmarks.empty() &&
            erased_observations.empty() && erased_landmarks.empty() && erased_keyframes.empty() &&
-           visible.empty() && found.empty();
+           counted.empty();
   }
 };
 

@@ -68,7 +68,7 @@ class MapMatcher {
     KeyframeId reference;  // shares most landmarks with the frame, of either camera
     int inliers = 0;
     Matrix6d information;  // of the pose, given the landmarks; as of PoseRefinementResult
-    MapEdit counts;        // found and visible landmarks
+    SeenLandmarks counts;
   };
 
   // Adds the landmarks of keyframes around `seeds`, at the local map's radius, aligns patches and

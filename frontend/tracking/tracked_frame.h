@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "backend/map/map_edit.h"
 #include "cameras/geometry/rigid3d.h"
@@ -13,6 +14,14 @@ enum class Prediction { kNone, kOdometer, kConstantVelocity, kLastPose };
 
 const char* to_string(PoseSource source);
 const char* to_string(Prediction prediction);
+
+// Landmarks of one frame, each once: those that it should show, and those that were found in it.
+struct SeenLandmarks {
+  std::vector<LandmarkId> visible;
+  std::vector<LandmarkId> found;
+
+  bool empty() const { return visible.empty() && found.empty(); }
+};
 
 // What tracking says of one frame.
 struct TrackedFrame {
@@ -30,7 +39,7 @@ struct TrackedFrame {
   int inliers = 0;  // landmarks that agree with the final pose
 
   std::optional<NewKeyframe> keyframe;  // set if the frame shall become one
-  MapEdit counts;                       // found and visible landmarks
+  SeenLandmarks counts;
 
   bool tracked() const { return source != PoseSource::kNone; }
 };

@@ -1,4 +1,4 @@
-#include "apps/pipeline/channel.h"
+#include "apps/slam/channel.h"
 
 #include <algorithm>
 #include <atomic>

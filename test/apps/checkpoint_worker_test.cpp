@@ -1,4 +1,4 @@
-#include "apps/pipeline/checkpoint_worker.h"
+#include "apps/slam/checkpoint_worker.h"
 
 #include <stdexcept>
 
@@ -19,57 +19,58 @@ std::shared_ptr<const MapSnapshot> map_of(std::size_t cameras) {
 TEST_CASE("Of the maps that come while one is saved, the last one follows", "[pipeline]") {
   Channel<std::size_t> begun(10);
   Channel<std::string> answers(10);
+  Channel<SessionFailure> failures(10);
   CheckpointWorker worker(
       [&](const MapSnapshot& map) {
         begun.push(map.camera_count());
         return answers.pop().value_or("");
       },
-      2);
+      2, [&](const SessionFailure& failure) { failures.push(failure); });
   for (std::size_t i = 1; i <= 2; ++i) worker.keyframe_added(map_of(i));
   CHECK(begun.pop() == 2U);
   for (std::size_t i = 3; i <= 9; ++i) worker.keyframe_added(map_of(i));  // waits for nobody
   answers.push("disk full");
   CHECK(begun.pop() == 8U);
-  const auto failures = worker.take_failures();
-  REQUIRE(failures.size() == 1);
-  CHECK(failures[0].text == "disk full");
-  CHECK_FALSE(failures[0].internal);
-  CHECK(worker.take_failures().empty());
+  const auto failure = failures.pop();
+  CHECK(failure->text == "disk full");
+  CHECK_FALSE(failure->internal);
   answers.push("");
   worker.finish();
   CHECK(begun.size() == 0);
-  CHECK(worker.take_failures().empty());
+  CHECK(failures.size() == 0);
   REQUIRE(worker.times().stages().size() == 1);
-  CHECK(worker.times().stages()[0].second.size() == 2);
+  CHECK(worker.times().stages()[0].second.count() == 2);
 }
 
 TEST_CASE("Without an interval nothing is saved", "[pipeline]") {
-  CheckpointWorker worker([](const MapSnapshot&) { return "saved"; }, 0);
+  int failures = 0;
+  CheckpointWorker worker([](const MapSnapshot&) { return "saved"; }, 0,
+                          [&](const SessionFailure&) { ++failures; });
   for (std::size_t i = 0; i < 10; ++i) worker.keyframe_added(map_of(i));
   worker.finish();
-  CHECK(worker.take_failures().empty());
+  CHECK(failures == 0);
 }
 
 TEST_CASE("What saving throws is told at once, as a bug of ours, and saving goes on",
           "[pipeline]") {
   Channel<std::size_t> begun(1);
+  Channel<SessionFailure> failures(10);
   CheckpointWorker worker(
       [&](const MapSnapshot& map) -> std::string {
         begun.push(map.camera_count());
         if (map.camera_count() == 1) throw std::logic_error("a bug");
         return {};
       },
-      1);
+      1, [&](const SessionFailure& failure) { failures.push(failure); });
   worker.keyframe_added(map_of(1));
   CHECK(begun.pop() == 1U);
-  std::vector<RunFailure> failures;
-  while (failures.empty()) failures = worker.take_failures();  // before finish()
-  CHECK(failures[0].text == "internal error while saving a checkpoint: a bug");
-  CHECK(failures[0].internal);
+  const auto failure = failures.pop();  // before finish()
+  CHECK(failure->text == "internal error while saving a checkpoint: a bug");
+  CHECK(failure->internal);
   worker.keyframe_added(map_of(2));
   CHECK(begun.pop() == 2U);
   worker.finish();
-  CHECK(worker.take_failures().empty());
+  CHECK(failures.size() == 0);
 }
 
 TEST_CASE("Every so many keyframes a checkpoint is due", "[pipeline]") {

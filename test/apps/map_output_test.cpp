@@ -3,7 +3,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "apps/pipeline/slam_options.h"
+#include "apps/slam/slam_options.h"
 #include "backend/map/map_file.h"
 #include "test/apps/program_run.h"
 #include "test/apps/rendered_survey.h"

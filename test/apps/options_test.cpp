@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "apps/pipeline/slam_options.h"
+#include "apps/slam/slam_options.h"
 #include "test/support/temp_folder.h"
 
 namespace hybrid_slam {

@@ -1,4 +1,4 @@
-#include "apps/pipeline/parallel_for.h"
+#include "apps/slam/parallel_for.h"
 
 #include <algorithm>
 #include <atomic>

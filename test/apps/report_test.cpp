@@ -1,5 +1,6 @@
 #include "apps/io/report.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
@@ -25,14 +26,30 @@ TEST_CASE("stage times: percentiles by nearest rank, stages in order") {
   CHECK(json["sift"]["max"] == 200.0);
 }
 
+TEST_CASE("of very many durations an even sample is kept, in order") {
+  Durations all;
+  Durations second_half;
+  constexpr int kMany = 100'000;
+  for (int i = 0; i < kMany; ++i) (i < kMany / 2 ? all : second_half).add(i);
+  all.merge(second_half);
+  CHECK(all.count() == kMany);
+  CHECK(all.mean() == Approx((kMany - 1) / 2.0));
+  CHECK(all.max() == kMany - 1);
+  CHECK(all.kept().size() <= Durations::kMostKept);
+  CHECK(all.kept().size() > Durations::kMostKept / 4);
+  CHECK(std::is_sorted(all.kept().begin(), all.kept().end()));
+  CHECK(percentile(all.kept(), 50) == Approx(kMany / 2.0).epsilon(0.001));
+  CHECK(percentile(all.kept(), 99) == Approx(0.99 * kMany).epsilon(0.001));
+}
+
 TEST_CASE("a stage clock adds one duration per lap") {
   StageTimes times;
   StageClock clock(times);
   clock.lap("a");
   clock.lap("b");
   REQUIRE(times.stages().size() == 2);
-  REQUIRE(times.stages()[0].second.size() == 1);
-  CHECK(times.stages()[0].second[0] >= 0);
+  REQUIRE(times.stages()[0].second.count() == 1);
+  CHECK(times.stages()[0].second.kept()[0] >= 0);
 }
 
 TEST_CASE("errors as JSON carry their units") {

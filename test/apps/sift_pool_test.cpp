@@ -1,4 +1,4 @@
-#include "apps/pipeline/sift_pool.h"
+#include "apps/slam/sift_pool.h"
 
 #include <atomic>
 #include <catch2/catch.hpp>

@@ -1,4 +1,4 @@
-#include "apps/pipeline/upsampling.h"
+#include "apps/slam/upsampling.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -14,26 +14,20 @@ constexpr int kDisparity = 8;  // of everything [px]
 constexpr int kWallWidth = kWidth + kDisparity;
 
 // A wall of blurred noise (sigma 1.4 px), seen by a stereo pair with this focal length [px].
-class Wall final : public ImageSequence {
+class Wall {
  public:
-  explicit Wall(double focal, bool readable = true) : readable_(readable) {
-    info_.stereo = {{focal, focal, 199.5, 149.5, 0.1}, kWidth, kHeight};
-    info_.times = {0, 0.2, 0.4, 0.6};
+  explicit Wall(double focal) {
+    cameras.stereo = {{focal, focal, 199.5, 149.5, 0.1}, kWidth, kHeight};
     std::mt19937 random(7);
     wall_.resize(static_cast<std::size_t>(kHeight) * kWallWidth);
     for (float& grey : wall_) grey = static_cast<float>(random() % 256);
     for (int i = 0; i < 3; ++i) blur();
   }
 
-  const SequenceInfo& info() const override { return info_; }
-  SequenceInfo& info() { return info_; }
+  CameraRig cameras;
 
-  FrameImages read(std::size_t) const override {
-    if (!readable_) throw InputError("damaged");
-    FrameImages images;
-    images.left = cut(0);
-    images.right = cut(kDisparity);
-    return images;
+  std::vector<std::shared_ptr<const StereoImages>> pairs() const {
+    return {3, std::make_shared<const StereoImages>(StereoImages{0, cut(0), cut(kDisparity)})};
   }
 
  private:
@@ -64,10 +58,12 @@ class Wall final : public ImageSequence {
     }
   }
 
-  bool readable_;
-  SequenceInfo info_;
   std::vector<float> wall_;
 };
+
+UpsamplingEvidence choose_upsampling(const Wall& wall, SlamOptions& options) {
+  return hybrid_slam::choose_upsampling(wall.cameras, wall.pairs(), options);
+}
 
 SlamOptions wanting(int features) {
   SlamOptions options;
@@ -107,13 +103,14 @@ TEST_CASE("What the options, a fisheye or damaged images leave no choice of") {
   CHECK_FALSE(off.sift.upsample);
 
   Wall hybrid(3000);
-  hybrid.info().fisheye.emplace();
+  hybrid.cameras.fisheye.emplace();
   SlamOptions with_fisheye = wanting(200);
   CHECK(choose_upsampling(hybrid, with_fisheye).chosen_by == "fisheye");
   CHECK(with_fisheye.sift.upsample);
 
   SlamOptions damaged = wanting(200);
-  CHECK(choose_upsampling(Wall(3000, false), damaged).chosen_by == "unreadable pairs");
+  CHECK(hybrid_slam::choose_upsampling(Wall(3000).cameras, {}, damaged).chosen_by ==
+        "unreadable pairs");
   CHECK(damaged.sift.upsample);
 }
 

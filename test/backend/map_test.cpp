@@ -206,7 +206,7 @@ TEST_CASE("What is gone or taken is skipped") {
   edit.erased_observations.push_back({LandmarkId(), {a, 7}});   // keypoint 7 sees nothing
   edit.erased_landmarks.push_back(LandmarkId(99));
   edit.erased_keyframes = {KeyframeId(9), KeyframeId(0)};  // unknown; the origin
-  edit.visible = {LandmarkId(99)};
+  edit.counted = {{LandmarkId(99), 1, 1}};
   tiny.map.apply(edit);
   CHECK(tiny.view().landmark_ids() == ids(0, 6));
   CHECK(tiny.view().keyframe_count() == 2);
@@ -332,8 +332,7 @@ TEST_CASE("The reference moves on when its observation goes") {
   const KeyframeId a = tiny.add(ids(0, 1));
   MapEdit edit;
   edit.erased_observations.push_back({LandmarkId(0), {KeyframeId(0), 0}});
-  edit.visible = {LandmarkId(0), LandmarkId(1)};
-  edit.found = {LandmarkId(1)};
+  edit.counted = {{LandmarkId(0), 1, 0}, {LandmarkId(1), 1, 1}};
   tiny.map.apply(edit);
   CHECK(tiny.view().at(LandmarkId(0)).reference == a);
   CHECK(tiny.view().at(LandmarkId(0)).visible == 2);

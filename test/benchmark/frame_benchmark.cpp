@@ -10,9 +10,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include "apps/pipeline/slam_run.h"
 #include "frontend/odometry/stereo_odometer.h"
 #include "test/integration/simulated_source.h"
+#include "test/support/replays.h"
 
 namespace hybrid_slam {
 namespace {
@@ -49,8 +49,13 @@ const ImageSequence* kitti() {
 }
 
 StereoFeatures load(const FrameSource& source, std::size_t index) {
+  Moment moment = source.read(index);
+  if (auto* frame = std::get_if<ExtractedFrame>(&moment.inputs.front())) {
+    return std::move(frame->frame.features);
+  }
   StageTimes times;
-  return source.make_loader()->load(index, times).stereo.features;
+  FrameExtractor extractor(source.cameras(), slam_options(), SiftDevice::kCpu, {});
+  return extractor.extract(std::get<StereoImages>(moment.inputs.front()), times).frame.features;
 }
 
 void sift(benchmark::State& state) {
@@ -70,7 +75,7 @@ void stereo_match(benchmark::State& state, const FrameSource& source, const Fram
   const StereoMatcherOptions options = slam_options().stereo;
   for (auto _ : state) {
     benchmark::DoNotOptimize(match_stereo(features.left, features.right, left.get(), right.get(),
-                                          source.camera(), options));
+                                          source.cameras().stereo, options));
   }
   state.counters["features"] = static_cast<double>(features.left.size());
 }
@@ -78,12 +83,12 @@ void stereo_match(benchmark::State& state, const FrameSource& source, const Fram
 void odometer(benchmark::State& state, const FrameSource& source) {
   const StereoFeatures previous = load(source, 0);
   const StereoFeatures current = load(source, 1);
-  const StereoOdometer stereo_odometer(source.camera(), slam_options().tracking.odometer);
+  const StereoOdometer stereo_odometer(source.cameras().stereo, slam_options().tracking.odometer);
   for (auto _ : state) benchmark::DoNotOptimize(stereo_odometer.estimate(previous, current));
 }
 
 void sequence(benchmark::State& state, const FrameSource& source) {
-  RunOptions run;
+  ReplayOptions run;
   run.limit = kFrames;
   StageTimes times;
   RunResult result;
@@ -92,9 +97,7 @@ void sequence(benchmark::State& state, const FrameSource& source) {
     times.merge(result.times);
   }
   for (const auto& [stage, durations] : times.stages()) {
-    double sum = 0;
-    for (const double duration : durations) sum += duration;
-    state.counters[stage] = sum / static_cast<double>(durations.size());
+    state.counters[stage] = durations.mean();
   }
   state.counters["tracked"] = result.frames.tracked;
   state.counters["keyframes"] = static_cast<double>(result.map->keyframe_count());

@@ -11,7 +11,7 @@
 
 #include "apps/io/hybrid_error.h"
 #include "apps/io/trajectory.h"
-#include "apps/pipeline/slam_run.h"
+#include "test/support/replays.h"
 
 namespace hybrid_slam {
 namespace {
@@ -72,10 +72,10 @@ std::optional<Outcome> run_sequence(const std::string& dataset, const std::strin
       open_sequence(std::string(data) + "/" + dataset, SequenceLayout::kAuto, name, cameras);
   SlamOptions options;
   options.distribute();
-  RunOptions run;
-  run.threads = 2;
+  ReplayOptions run;
+  run.session.threads = 2;
   run.limit = limit;
-  const RunResult result = run_every_frame(ImageFrameSource(*sequence, options), options, run, {});
+  const RunResult result = run_every_frame(ImageFrameSource(*sequence), options, run, {});
   const Trajectory estimate = trajectory(result, result.records);
   const auto error =
       absolute_error(associate(estimate, sequence->info().truth, 0.02), TrajectoryAlignment::kSe3);

@@ -52,8 +52,8 @@ int found_alone(const MapSnapshot& map, const SimulatedSource& source) {
   for (std::size_t i = 0; i < 78; i += 3) {
     SimulatedSource one(source.scene());
     one.order = {i};
-    RunOptions run = simulated_run(source);
-    run.localize = true;
+    ReplayOptions run = simulated_run(source);
+    run.session.localize = true;
     const RunResult result = run_every_frame(one, simulated_options(), run, {}, copy_of(map));
     if (result.frames.tracked != 1) continue;
     const Rigid3d pose = result.cam_from_world(result.records.front());
@@ -108,8 +108,8 @@ double growth(const SimulatedSource& source, int full_keyframes, RunResult& resu
   options.backend.local.max_fixed = 5;
   double from = 0;
   std::size_t keyframes = 0;
-  RunHooks hooks;
-  hooks.progress = [&](const RunProgress& progress) {
+  ReplayHooks hooks;
+  hooks.progress = [&](const ReplayProgress& progress) {
     if (keyframes > 0 || 2 * progress.done < progress.total) return;
     keyframes = progress.keyframes;
     from = held_kb();
@@ -128,7 +128,7 @@ TEST_CASE("Loops are closed and frames found as if no feature had been dropped",
   int found = 0, found_whole = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const SimulatedSource source = drifting_lap(seed);
-    const RunOptions run = simulated_run(source);
+    const ReplayOptions run = simulated_run(source);
     const RunResult whole =
         run_every_frame(source, with_full_keyframes(short_sighted(), 0), run, {});
     const RunResult dropped =
@@ -162,7 +162,7 @@ TEST_CASE("A keyframe costs the process what its useful features cost", "[integr
   const SimulatedSource source(make_synthetic_scene(options));
   RunResult result;
   const double dropped = growth(source, 10, result);
-  KeyframeDatabase places(simulated_run(source).vocabulary);
+  KeyframeDatabase places(simulated_run(source).session.vocabulary);
   const std::string table = owners(*result.map);
   const std::size_t stored = stored_features(*result.map) / result.map->keyframe_count();
   const double whole = growth(source, 0, result);

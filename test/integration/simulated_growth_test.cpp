@@ -11,7 +11,7 @@ namespace {
 
 std::vector<double> stage(const RunResult& result, std::string_view name) {
   for (const auto& [stage, durations] : result.times.stages()) {
-    if (stage == name) return durations;
+    if (stage == name) return durations.kept();
   }
   return {};
 }
@@ -48,10 +48,10 @@ TEST_CASE("Tracking and the search for loops cost the same at 200 and at 2000 ke
   slam.tracking.keyframes.max_frames_between = 1;  // every frame becomes one, and stays
   slam.culling.redundant_observers = 1000;
   std::stop_source cancel;
-  RunHooks hooks;
+  ReplayHooks hooks;
   hooks.cancelled = cancel.get_token();
   std::vector<std::size_t> keyframes_at;  // of the map, by frame
-  hooks.progress = [&](const RunProgress& progress) {
+  hooks.progress = [&](const ReplayProgress& progress) {
     keyframes_at.push_back(progress.keyframes);
     if (progress.keyframes >= 2050) cancel.request_stop();
   };
@@ -97,8 +97,8 @@ TEST_CASE("Two thousand frames over mapped ground add few keyframes", "[integrat
     source.order.push_back(phase < 200 ? phase : 399 - phase);
   }
   std::size_t early = 0;
-  RunHooks hooks;
-  hooks.progress = [&](const RunProgress& progress) {
+  ReplayHooks hooks;
+  hooks.progress = [&](const ReplayProgress& progress) {
     if (progress.done == 400) early = progress.keyframes;
   };
   const RunResult result =

@@ -4,8 +4,8 @@
 #include <cstring>
 #include <numbers>
 
-#include "apps/pipeline/slam_run.h"
 #include "test/integration/simulated_source.h"
+#include "test/support/replays.h"
 
 namespace hybrid_slam {
 namespace {
@@ -109,7 +109,7 @@ TEST_CASE("A fisheye that was blind is found again at once, while stereo goes on
   source.fisheye_blank = {15, 16, 17, 18};
   source.fisheye_missing = {25, 26};
   std::vector<std::string> warnings;
-  RunHooks hooks;
+  ReplayHooks hooks;
   hooks.warning = [&](const std::string& line) { warnings.push_back(line); };
   const RunResult result = run_every_frame(source, slam_options(), {}, hooks);
   CHECK(result.frames.tracked == 40);
@@ -134,8 +134,8 @@ TEST_CASE("While the stereo pair is blind, the fisheye is still placed", "[integ
 TEST_CASE("Hybrid runs repeat bit by bit, whatever the number of threads", "[integration]") {
   const SimulatedSource source(make_synthetic_scene(hover(20)));
   const auto poses = [&](int threads) {
-    RunOptions run;
-    run.threads = threads;
+    ReplayOptions run;
+    run.session.threads = threads;
     const RunResult result = run_every_frame(source, slam_options(), run, {});
     std::vector<double> values;
     for (const auto* records : {&result.records, &result.fisheye_records}) {
@@ -154,8 +154,8 @@ TEST_CASE("Hybrid runs repeat bit by bit, whatever the number of threads", "[int
 
 TEST_CASE("realtime mode tracks both cameras", "[integration]") {
   const SimulatedSource source(make_synthetic_scene(hover(40)));
-  RunOptions run;
-  run.threads = 2;
+  ReplayOptions run;
+  run.session.threads = 2;
   const RunResult result = run_realtime(source, slam_options(), run, {});
   CHECK(result.frames.tracked == 40);
   CHECK(result.fisheye_frames.tracked == 40);

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "apps/pipeline/local_mapping.h"
+#include "apps/slam/local_mapping.h"
 #include "test/integration/simulated_runs.h"
 #include "test/support/random.h"
 
@@ -100,7 +100,7 @@ TEST_CASE("A loop is closed and takes out the drift", "[integration]") {
   double without = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const SimulatedSource source = drifting_lap(seed);
-    const RunOptions run = simulated_run(source);
+    const ReplayOptions run = simulated_run(source);
     const RunResult open = run_every_frame(source, short_sighted(false), run, {});
     const RunResult closed = run_every_frame(source, short_sighted(), run, {});
     CAPTURE(seed, told(closed));
@@ -121,9 +121,9 @@ TEST_CASE("A loop is closed and takes out the drift", "[integration]") {
 
 TEST_CASE("Loops are closed to the same bits whatever the number of threads", "[integration]") {
   const SimulatedSource source = drifting_lap();
-  RunOptions run = simulated_run(source);
+  ReplayOptions run = simulated_run(source);
   const RunResult once = run_every_frame(source, short_sighted(), run, {});
-  run.threads = 3;
+  run.session.threads = 3;
   const RunResult again = run_every_frame(source, short_sighted(), run, {});
   CHECK(accepted(once) >= 1);
   const auto a = poses_of(once);
@@ -135,10 +135,10 @@ TEST_CASE("Loops are closed to the same bits whatever the number of threads", "[
 
 TEST_CASE("realtime mode closes the loop, too", "[integration]") {
   const SimulatedSource source = drifting_lap(8);
-  RunOptions run = simulated_run(source);
-  run.threads = 2;
-  RunHooks hooks;  // without images, tracking would run away from mapping, without keyframes
-  hooks.progress = [](const RunProgress&) {
+  ReplayOptions run = simulated_run(source);
+  run.session.threads = 2;
+  ReplayHooks hooks;  // without images, tracking would run away from mapping, without keyframes
+  hooks.progress = [](const ReplayProgress&) {
     std::this_thread::sleep_for(std::chrono::milliseconds(25));
   };
   const RunResult result = run_realtime(source, short_sighted(), run, hooks);

@@ -135,8 +135,8 @@ TEST_CASE("A second run goes on with the map of the first", "[integration]") {
 TEST_CASE("Localising tracks every frame and leaves the map as it was", "[integration]") {
   const RunResult a = first_run();
   const SimulatedSource source = hover(1);
-  RunOptions run = simulated_run(source);
-  run.localize = true;
+  ReplayOptions run = simulated_run(source);
+  run.session.localize = true;
   for (const bool realtime : {false, true}) {
     const auto run_c = realtime ? run_realtime : run_every_frame;
     const RunResult c = run_c(source, simulated_options(), run, {}, copy_of(*a.map));

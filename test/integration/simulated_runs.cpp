@@ -30,14 +30,14 @@ SlamOptions simulated_options(bool loops) {
   return options;
 }
 
-RunOptions simulated_run(const SimulatedSource& source) {
+ReplayOptions simulated_run(const SimulatedSource& source) {
   SyntheticScene some;
   const std::size_t stride = std::max<std::size_t>(1, source.scene().frames.size() / 16);
   for (std::size_t i = 0; i < source.scene().frames.size(); i += stride) {
     some.frames.push_back(source.scene().frames[i]);
   }
-  RunOptions run;
-  run.vocabulary = scene_vocabulary(some);
+  ReplayOptions run;
+  run.session.vocabulary = scene_vocabulary(some);
   return run;
 }
 

@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "apps/pipeline/slam_run.h"
 #include "backend/map/map.h"
 #include "test/integration/simulated_source.h"
+#include "test/support/replays.h"
 
 namespace hybrid_slam {
 
@@ -18,7 +18,7 @@ SyntheticSceneOptions orbit_of(int times);
 SlamOptions simulated_options(bool loops = true);
 
 // With a vocabulary of what is seen in the scene, of some of its frames.
-RunOptions simulated_run(const SimulatedSource& source);
+ReplayOptions simulated_run(const SimulatedSource& source);
 
 // Between the estimated and the true camera centres; both worlds are the first frame's camera. Of
 // runs that read each frame of the source.

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include "apps/pipeline/slam_run.h"
 #include "test/integration/simulated_source.h"
+#include "test/support/replays.h"
 
 namespace hybrid_slam {
 namespace {
@@ -84,9 +84,9 @@ TEST_CASE("Wrong matches do not bend a simulated corridor", "[integration]") {
 
 TEST_CASE("every-frame mode gives the same bits whatever the number of threads", "[integration]") {
   const SimulatedSource source(make_synthetic_scene(orbit(30)));
-  RunOptions run;
+  ReplayOptions run;
   const auto once = poses(run_every_frame(source, slam_options(), run, {}));
-  run.threads = 3;
+  run.session.threads = 3;
   const auto again = poses(run_every_frame(source, slam_options(), run, {}));
   REQUIRE(once.size() == again.size());
   CHECK(std::memcmp(once.data(), again.data(), once.size() * sizeof(double)) == 0);
@@ -107,10 +107,10 @@ TEST_CASE("Unreadable frames are counted and tracking goes on", "[integration]")
   SimulatedSource source(make_synthetic_scene(orbit(60)));
   source.corrupt = {0, 10, 11, 59};
   std::vector<std::string> warnings;
-  RunHooks hooks;
+  ReplayHooks hooks;
   hooks.warning = [&](const std::string& line) { warnings.push_back(line); };
-  RunProgress last;
-  hooks.progress = [&](const RunProgress& progress) { last = progress; };
+  ReplayProgress last;
+  hooks.progress = [&](const ReplayProgress& progress) { last = progress; };
   const RunResult result = run_every_frame(source, slam_options(), {}, hooks);
   CHECK(result.frames.read == 60);
   CHECK(result.frames.corrupt == 4);
@@ -144,8 +144,8 @@ TEST_CASE("A source without features never starts a map, and says so", "[integra
 
 TEST_CASE("realtime mode tracks the same scene and joins its threads", "[integration]") {
   const SimulatedSource source(make_synthetic_scene(orbit(60)));
-  RunOptions run;
-  run.threads = 2;
+  ReplayOptions run;
+  run.session.threads = 2;
   const RunResult result = run_realtime(source, slam_options(), run, {});
   CHECK(result.frames.read == 60);
   CHECK(result.frames.tracked >= 58);
@@ -155,7 +155,7 @@ TEST_CASE("realtime mode tracks the same scene and joins its threads", "[integra
 
 TEST_CASE("With a rate, images that come too early are dropped and counted", "[integration]") {
   const SimulatedSource source(make_synthetic_scene(orbit(60)));
-  RunOptions run;
+  ReplayOptions run;
   run.rate = 1e5;
   const RunResult result = run_realtime(source, slam_options(), run, {});
   CHECK(result.frames.dropped > 0);
@@ -168,16 +168,21 @@ TEST_CASE("A run can be cancelled at any frame and keeps what it has", "[integra
   for (const bool realtime : {false, true}) {
     for (const int after : {1, 7, 23}) {
       std::stop_source cancel;
-      RunHooks hooks;
+      ReplayHooks hooks;
       hooks.cancelled = cancel.get_token();
-      hooks.progress = [&](const RunProgress& progress) {
+      hooks.progress = [&](const ReplayProgress& progress) {
         if (static_cast<int>(progress.done) >= after) cancel.request_stop();
       };
       const RunResult result = realtime ? run_realtime(source, slam_options(), {}, hooks)
                                         : run_every_frame(source, slam_options(), {}, hooks);
       CHECK(result.cancelled);
-      CHECK(result.frames.read == after);
-      CHECK(result.frames.tracked == after);
+      // In realtime, who hears of a frame hears of it while the next one is tracked.
+      if (realtime) {
+        CHECK(result.frames.read >= after);
+      } else {
+        CHECK(result.frames.read == after);
+      }
+      CHECK(result.frames.tracked == result.frames.read);
     }
   }
 }
@@ -186,10 +191,10 @@ TEST_CASE("A run that waits for a slow camera ends at once when it is cancelled"
   const SimulatedSource source(make_synthetic_scene(orbit(60)));
   std::stop_source cancel;
   std::atomic<int> done = 0;
-  RunHooks hooks;
+  ReplayHooks hooks;
   hooks.cancelled = cancel.get_token();
-  hooks.progress = [&](const RunProgress&) { ++done; };
-  RunOptions run;
+  hooks.progress = [&](const ReplayProgress&) { ++done; };
+  ReplayOptions run;
   run.rate = 0.001;  // the second image is due in a quarter of an hour
   const auto start = std::chrono::steady_clock::now();
   const std::jthread canceller([&] {
@@ -207,19 +212,21 @@ TEST_CASE("A run that waits for a slow camera ends at once when it is cancelled"
 TEST_CASE("A checkpoint that fails by a bug is told when it happens, and the run goes on",
           "[integration]") {
   const SimulatedSource source(make_synthetic_scene(orbit(40)));
-  RunOptions run;
-  run.checkpoint_every = 2;
+  ReplayOptions run;
+  run.session.checkpoint_every = 2;
   for (const bool realtime : {false, true}) {
     std::size_t told_at = 0;  // frame
     std::size_t done = 0;
     std::vector<std::string> warnings;
-    RunHooks hooks;
-    hooks.progress = [&](const RunProgress& progress) { done = progress.done; };
+    ReplayHooks hooks;
+    hooks.progress = [&](const ReplayProgress& progress) { done = progress.done; };
     hooks.warning = [&](const std::string& text) {
       warnings.push_back(text);
       if (told_at == 0) told_at = done;
     };
-    hooks.checkpoint = [](const MapSnapshot&) -> std::string { throw std::logic_error("a bug"); };
+    run.session.checkpoint = [](const MapSnapshot&, const MapFileInfo&) -> std::string {
+      throw std::logic_error("a bug");
+    };
     const RunResult result = realtime ? run_realtime(source, slam_options(), run, hooks)
                                       : run_every_frame(source, slam_options(), run, hooks);
     CHECK(result.frames.tracked == 40);

@@ -1,6 +1,8 @@
 #include "test/integration/simulated_source.h"
 
-#include "cameras/input_error.h"
+#include <string>
+#include <utility>
+
 #include "test/support/stereo_frame.h"
 
 namespace hybrid_slam {
@@ -12,43 +14,40 @@ Frame without_features(const Frame& frame) {
   return make_frame(frame.index, frame.time, std::move(none), 64, 64);
 }
 
-class SimulatedLoader final : public FrameLoader {
- public:
-  explicit SimulatedLoader(const SimulatedSource& source) : source_(source) {}
-
-  FrameSet load(std::size_t index, StageTimes&) override {
-    if (source_.corrupt.contains(index)) {
-      throw InputError("frame " + std::to_string(index) + ": made unreadable by the test");
-    }
-    FrameSet frames{stereo_frame(source_.stereo_truth(index), source_.camera()), {}, {}};
-    if (source_.blank.contains(index)) frames.stereo = without_features(frames.stereo);
-    if (source_.fisheye_missing.contains(index)) {
-      frames.fisheye_error = "frame " + std::to_string(index) + ": no fisheye image";
-    } else if (source_.fisheye() != nullptr) {
-      frames.fisheye = mono_frame(source_.fisheye_truth(index), *source_.fisheye());
-      if (source_.fisheye_blank.contains(index)) {
-        frames.fisheye = without_features(*frames.fisheye);
-      }
-    }
-    number(index, frames.stereo);
-    if (frames.fisheye) number(index, *frames.fisheye);
-    return frames;
-  }
-
- private:
-  void number(std::size_t index, Frame& frame) const {
-    if (source_.order.empty()) return;
-    frame.index = static_cast<std::int64_t>(index);
-    frame.time = static_cast<double>(index) / source_.scene().options.frame_rate;
-  }
-
-  const SimulatedSource& source_;
-};
-
 }  // namespace
 
-std::unique_ptr<FrameLoader> SimulatedSource::make_loader() const {
-  return std::make_unique<SimulatedLoader>(*this);
+CameraRig SimulatedSource::cameras() const {
+  CameraRig cameras{std::get<Calibrated<RectifiedStereo>>(scene_.cameras.front()), std::nullopt};
+  if (scene_.cameras.size() > 1) {
+    cameras.fisheye = std::get<Calibrated<KannalaBrandt>>(scene_.cameras[1]);
+  }
+  return cameras;
+}
+
+ExtractedFrame SimulatedSource::extracted(CameraKind camera, std::size_t index, Frame frame) const {
+  const double time =
+      order.empty() ? frame.time : static_cast<double>(index) / scene_.options.frame_rate;
+  return {to_nanoseconds(time), camera, std::move(frame)};
+}
+
+Moment SimulatedSource::read(std::size_t index) const {
+  Moment made;
+  if (corrupt.contains(index)) {
+    made.error = "frame " + std::to_string(index) + ": made unreadable by the test";
+    return made;
+  }
+  const CameraRig rig = cameras();
+  Frame stereo = stereo_frame(stereo_truth(index), rig.stereo);
+  if (blank.contains(index)) stereo = without_features(stereo);
+  made.inputs.push_back(extracted(CameraKind::kStereo, index, std::move(stereo)));
+  if (fisheye_missing.contains(index)) {
+    made.fisheye_error = "frame " + std::to_string(index) + ": no fisheye image";
+  } else if (rig.fisheye) {
+    Frame fisheye = mono_frame(fisheye_truth(index), *rig.fisheye);
+    if (fisheye_blank.contains(index)) fisheye = without_features(fisheye);
+    made.inputs.push_back(extracted(CameraKind::kFisheye, index, std::move(fisheye)));
+  }
+  return made;
 }
 
 }  // namespace hybrid_slam

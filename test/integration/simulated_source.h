@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/pipeline/frame_source.h"
+#include "apps/slam/replay.h"
 #include "test/support/synthetic_scene.h"
 
 namespace hybrid_slam {
@@ -18,14 +18,8 @@ class SimulatedSource final : public FrameSource {
   std::size_t size() const override {
     return order.empty() ? scene_.frames.size() / scene_.cameras.size() : order.size();
   }
-  const Calibrated<RectifiedStereo>& camera() const override {
-    return std::get<Calibrated<RectifiedStereo>>(scene_.cameras.front());
-  }
-  const Calibrated<KannalaBrandt>* fisheye() const override {
-    return scene_.cameras.size() > 1 ? &std::get<Calibrated<KannalaBrandt>>(scene_.cameras[1])
-                                     : nullptr;
-  }
-  std::unique_ptr<FrameLoader> make_loader() const override;
+  CameraRig cameras() const override;
+  Moment read(std::size_t index) const override;
 
   // What is known of the frames of this index.
   const SyntheticFrame& stereo_truth(std::size_t index) const {
@@ -46,6 +40,7 @@ class SimulatedSource final : public FrameSource {
   std::set<std::size_t> fisheye_missing;  // indices at which the fisheye's image cannot be read
 
  private:
+  ExtractedFrame extracted(CameraKind camera, std::size_t index, Frame frame) const;
   std::size_t moment(std::size_t index) const { return order.empty() ? index : order[index]; }
 
   SyntheticScene scene_;

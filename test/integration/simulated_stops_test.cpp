@@ -38,8 +38,8 @@ struct EndOfLap {
 // Starts and stops, by turns at a random frame and at a random time.
 void start_and_stop(int cycles, std::uint64_t seed) {
   const EndOfLap lap;
-  RunOptions run = simulated_run(lap.source);
-  run.threads = 2;
+  ReplayOptions run = simulated_run(lap.source);
+  run.session.threads = 2;
   const auto start = std::chrono::steady_clock::now();
   const RunResult whole = run_realtime(lap.source, simulated_options(), run, {}, copy_of(*lap.map));
   const double seconds = Seconds(std::chrono::steady_clock::now() - start).count();
@@ -52,11 +52,11 @@ void start_and_stop(int cycles, std::uint64_t seed) {
     const Seconds after(random.uniform(0, 1.2 * seconds));
     const bool by_frame = i % 2 == 0;
     std::stop_source cancel;
-    RunHooks hooks;
+    ReplayHooks hooks;
     hooks.cancelled = cancel.get_token();
     std::jthread canceller;
     if (by_frame) {
-      hooks.progress = [&](const RunProgress& progress) {
+      hooks.progress = [&](const ReplayProgress& progress) {
         if (progress.done >= last) cancel.request_stop();
       };
     } else {

@@ -27,8 +27,8 @@ void RandomEdits::step() {
       break;
     case 5:
       edit.erased_landmarks.push_back(landmark());
-      edit.visible.push_back(landmark());
-      edit.found.push_back(landmark());
+      edit.counted.push_back({landmark(), 1, 0});
+      edit.counted.push_back({landmark(), 0, 1});
       break;
     case 6:
       if (random_.below(20) == 0) edit.erased_keyframes.push_back(keyframe());

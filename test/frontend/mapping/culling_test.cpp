@@ -110,8 +110,8 @@ TEST_CASE("A landmark that is visible but rarely found goes while it is young") 
   probation.cull(made.map.view(), made.add({}, all_points()));
   MapEdit counts;
   for (int frame = 0; frame < 11; ++frame) {
-    counts.visible.insert(counts.visible.end(), {LandmarkId(0), LandmarkId(1)});
-    if (frame < 3) counts.found.push_back(LandmarkId(1));
+    counts.counted.push_back({LandmarkId(0), 1, 0});
+    counts.counted.push_back({LandmarkId(1), 1, frame < 3 ? 1 : 0});
   }
   made.map.apply(counts);  // landmark 0: 1 of 12 found; landmark 1: 4 of 12
   const auto edit = probation.cull(made.map.view(), made.add(all_points(), {}));
@@ -126,7 +126,7 @@ TEST_CASE("Probation ends: an old landmark is not judged any more") {
     CHECK(probation.cull(made.map.view(), made.add(all_points(), {})).empty());
   }
   MapEdit counts;
-  counts.visible.assign(100, LandmarkId(0));
+  counts.counted = {{LandmarkId(0), 100, 0}};
   made.map.apply(counts);
   CHECK(probation.cull(made.map.view(), made.add(all_points(), {})).empty());
 }

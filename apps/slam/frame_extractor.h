@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/io/stage_times.h"
+#include "apps/slam/inputs.h"
+#include "apps/slam/slam_options.h"
+#include "apps/slam/upsampling.h"
+#include "frontend/features/sift_device.h"
+
+namespace hybrid_slam {
+
+class SiftPool;
+
+// The first images of each camera, from which is settled how features are extracted.
+struct FirstImages {
+  std::vector<std::shared_ptr<const StereoImages>> stereo;
+  std::vector<std::shared_ptr<const FisheyeImage>> fisheye;
+
+  // How many are looked at, of each camera.
+  static constexpr std::size_t kStereo = 3;
+  static constexpr std::size_t kFisheye = 3;
+};
+
+// Makes frames of images: SIFT in all of them, stereo matching, contrast and mask of the fisheye.
+// Several threads at a time.
+class FrameExtractor {
+ public:
+  // Settles upsampling and what the fisheye shows of the world by the first images. Throws
+  // InputError as make_fisheye_mask() does.
+  FrameExtractor(const CameraRig& cameras, const SlamOptions& options, SiftDevice device,
+                 const FirstImages& first);
+  ~FrameExtractor();
+
+  CameraFrame extract(const StereoImages& images, StageTimes& times);
+  CameraFrame extract(const FisheyeImage& image, StageTimes& times);
+
+  const UpsamplingEvidence& upsampling() const { return upsampling_; }
+  bool upsamples() const { return options_.sift.upsample; }
+
+ private:
+  std::vector<FeatureSet> find_features(const StereoImages& images, StageTimes& times);
+
+  CameraRig cameras_;
+  SlamOptions options_;
+  UpsamplingEvidence upsampling_;
+  std::unique_ptr<SiftPool> sift_;
+  std::unique_ptr<SiftPool> fisheye_sift_;  // null without a fisheye
+  GrayImage fisheye_mask_;                  // empty without a fisheye
+};
+
+}  // namespace hybrid_slam

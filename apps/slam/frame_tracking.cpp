@@ -1,0 +1,122 @@
+#include "apps/slam/frame_tracking.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace hybrid_slam {
+
+namespace {
+
+std::int64_t next_frame_index(const MapSnapshot& map) {
+  std::int64_t next = 0;
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    next = std::max(next, map.newest_frame_index(CameraId(i)) + 1);
+  }
+  return next;
+}
+
+StereoTrackerOptions stereo_options(const CameraRig& cameras, const SlamOptions& options) {
+  StereoTrackerOptions stereo = options.tracking;
+  if (cameras.fisheye) {
+    stereo.keyframes.min_tracked_ratio =
+        std::max(stereo.keyframes.min_tracked_ratio, options.fisheye.stereo_tracked_ratio);
+  }
+  return stereo;
+}
+
+TrackingState state_of(const TrackedFrame& tracked, const MapSnapshot& map) {
+  switch (tracked.source) {
+    case PoseSource::kInitialization:
+    case PoseSource::kLocalMap:
+      return TrackingState::kMap;
+    case PoseSource::kOdometer:
+      return TrackingState::kOdometry;
+    case PoseSource::kRelocalization:
+      return TrackingState::kRelocalised;
+    case PoseSource::kNone:
+      break;
+  }
+  return map.origin().valid() ? TrackingState::kLost : TrackingState::kStarting;
+}
+
+}  // namespace
+
+const char* to_string(TrackingState state) {
+  switch (state) {
+    case TrackingState::kStarting:
+      return "starting";
+    case TrackingState::kMap:
+      return "map";
+    case TrackingState::kOdometry:
+      return "odometry";
+    case TrackingState::kRelocalised:
+      return "relocalised";
+    case TrackingState::kLost:
+      break;
+  }
+  return "lost";
+}
+
+FrameTracking::FrameTracking(const CameraRig& cameras, const SlamOptions& options,
+                             const Vocabulary& vocabulary, bool localize, LocalMapping& mapping,
+                             Observers& observers, StageTimes& times)
+    : places_(std::make_shared<KeyframeDatabase>(vocabulary)),
+      stereo_(mapping.camera_id(cameras.stereo), cameras.stereo, stereo_options(cameras, options),
+              places_),
+      observers_(observers),
+      times_(times),
+      localize_(localize),
+      first_index_(next_frame_index(mapping.map().view())) {
+  if (localize_ && !mapping.map().view().origin().valid()) {
+    throw std::logic_error("FrameTracking: nothing to localise in");
+  }
+  if (cameras.fisheye) {
+    fisheye_.emplace(mapping.camera_id(*cameras.fisheye), *cameras.fisheye,
+                     options.fisheye.tracking, places_);
+  }
+}
+
+std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnapshot& map,
+                                               bool allow_keyframe) {
+  FrameResult result;
+  result.camera = frame.camera;
+  result.time = frame.time;
+  result.features = static_cast<int>(frame.frame.size());
+  const auto& rights = frame.frame.features.right_of_left;
+  result.stereo_matches =
+      static_cast<int>(std::count_if(rights.begin(), rights.end(), [](int k) { return k >= 0; }));
+  result.keyframes = map.keyframe_count();
+  result.landmarks = map.landmark_count();
+  TrackedFrame tracked = track_by_camera(frame, map, allow_keyframe && !localize_);
+  if (!localize_) counts_.add(tracked.counts);  // else no keyframe would take them
+  result.index = tracked.frame_index;
+  result.state = state_of(tracked, map);
+  auto keyframe = std::exchange(tracked.keyframe, std::nullopt);
+  tracked.counts = {};
+  result.tracked = std::move(tracked);
+  observers_.frame(std::move(result));
+  if (!keyframe) return std::nullopt;
+  const KeyframeId reference = keyframe->reference;
+  return MappingJob{frame.camera, std::move(*keyframe),
+                    reference.valid() ? map.cam_from_world(reference) : Rigid3d(), counts_.take()};
+}
+
+TrackedFrame FrameTracking::track_by_camera(CameraFrame& frame, const MapSnapshot& map,
+                                            bool allow_keyframe) {
+  StageClock clock(times_);
+  places_->follow(map);
+  frame.frame.index += first_index_;
+  if (frame.camera == CameraKind::kStereo) {
+    TrackedFrame tracked = stereo_.track(std::move(frame.frame), map, allow_keyframe);
+    clock.lap("track");
+    stereo_reference_ = tracked.reference;
+    return tracked;
+  }
+  TrackedFrame tracked =
+      fisheye_.value().track(std::move(frame.frame), map, stereo_reference_, allow_keyframe);
+  clock.lap("track_fisheye");
+  return tracked;
+}
+
+}  // namespace hybrid_slam

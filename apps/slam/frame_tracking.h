@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "apps/slam/local_mapping.h"
+#include "apps/slam/observers.h"
+#include "frontend/place_recognition/keyframe_database.h"
+#include "frontend/tracking/fisheye_tracker.h"
+#include "frontend/tracking/stereo_tracker.h"
+
+namespace hybrid_slam {
+
+// What both modes do with frames: tracks them, tells the observers, and gathers what the next
+// keyframe takes along. One thread.
+class FrameTracking {
+ public:
+  // Adds the cameras to the map, if it does not have them yet. `localize`: no frame becomes a
+  // keyframe.
+  FrameTracking(const CameraRig& cameras, const SlamOptions& options, const Vocabulary& vocabulary,
+                bool localize, LocalMapping& mapping, Observers& observers, StageTimes& times);
+
+  // What mapping has to do, if the frame shall become a keyframe. Frames come in the order of their
+  // times, a stereo frame before the fisheye's of the same time.
+  std::optional<MappingJob> track(CameraFrame frame, const MapSnapshot& map,
+                                  bool allow_keyframe = true);
+
+  // The words of the map's keyframes, which follow it: for use in the same thread.
+  std::shared_ptr<KeyframeDatabase> places() const { return places_; }
+
+ private:
+  TrackedFrame track_by_camera(CameraFrame& frame, const MapSnapshot& map, bool allow_keyframe);
+
+  std::shared_ptr<KeyframeDatabase> places_;
+  StereoTracker stereo_;
+  std::optional<FisheyeTracker> fisheye_;
+  Observers& observers_;
+  StageTimes& times_;
+  bool localize_;
+  std::int64_t first_index_;     // of this session's frames in the map, after those of others
+  KeyframeId stereo_reference_;  // of the last stereo frame; invalid if that was lost
+  LandmarkCounts counts_;        // since the last keyframe
+};
+
+}  // namespace hybrid_slam

@@ -1,0 +1,111 @@
+#include "apps/slam/local_mapping.h"
+
+#include <utility>
+
+#include "frontend/mapping/fusion.h"
+#include "frontend/mapping/triangulation.h"
+
+namespace hybrid_slam {
+
+namespace {
+
+// The keyframe as it lies in `map`, which may have moved since it was tracked: by a loop that was
+// closed, far.
+NewKeyframe carried_along(const MappingJob& job, const MapSnapshot& map) {
+  NewKeyframe keyframe = job.keyframe;
+  if (!keyframe.reference.valid()) return keyframe;
+  const Rigid3d reference = map.cam_from_world(keyframe.reference);
+  if (reference.params == job.reference_from_world.params) return keyframe;
+  const Rigid3d now_from_then = inverse(reference) * job.reference_from_world;
+  keyframe.cam_from_world = keyframe.cam_from_world * inverse(now_from_then);
+  for (auto& [keypoint, point] : keyframe.new_points) point = now_from_then * point;
+  return keyframe;
+}
+
+}  // namespace
+
+void LandmarkCounts::add(const SeenLandmarks& frame) {
+  const auto count_of = [&](LandmarkId id) -> LandmarkCount& {
+    return counts_.try_emplace(id, LandmarkCount{id}).first->second;
+  };
+  for (const LandmarkId id : frame.visible) ++count_of(id).visible;
+  for (const LandmarkId id : frame.found) ++count_of(id).found;
+}
+
+std::vector<LandmarkCount> LandmarkCounts::take() {
+  std::vector<LandmarkCount> counts;
+  counts.reserve(counts_.size());
+  for (const auto& [id, count] : counts_) counts.push_back(count);
+  counts_.clear();
+  return counts;
+}
+
+LocalMapping::LocalMapping(const SlamOptions& options, Map map)
+    : options_(options),
+      backend_(options.backend, std::move(map)),
+      probation_(options.culling),
+      use_(options.culling, backend_.view()) {}
+
+CameraId LocalMapping::camera_id(const Camera& camera) {
+  const MapSnapshot& map = backend_.view();
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    if (map.camera(CameraId(i)) == camera) return CameraId(i);
+  }
+  return backend_.add_camera(camera);
+}
+
+KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::stop_token stop,
+                                 const std::function<void()>& publish) {
+  StageClock clock(times);
+  MapEdit counts;
+  counts.counted = job.counts;
+  backend_.apply(counts);
+  const KeyframeId id = backend_.add(carried_along(job, backend_.view()));
+  backend_.apply(probation_.cull(backend_.view(), id));
+  clock.lap("insert_keyframe");
+  backend_.apply(triangulate_with_neighbours(backend_.view(), id, options_.triangulation));
+  clock.lap("triangulate");
+  backend_.apply(fuse_with_neighbours(backend_.view(), id, options_.fusion));
+  clock.lap("fuse");
+  publish();
+  backend_.optimize_local(id, std::move(stop));
+  clock.lap("local_bundle");
+  backend_.apply(cull_keyframes(backend_.view(), id, options_.culling));
+  clock.lap("cull_keyframes");
+  backend_.drop_features(use_.gone_out(backend_.view()));
+  clock.lap("drop_features");
+  publish();
+  return id;
+}
+
+LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
+                                const std::function<void()>& publish) {
+  StageClock clock(times);
+  const LoopOutcome outcome = backend_.close(loop);
+  clock.lap("close_loop");
+  if (outcome.end != LoopEnd::kClosed) return outcome;
+  backend_.optimize_local(loop.keyframe);
+  clock.lap("local_bundle");
+  backend_.apply(fuse_places(backend_.view(), loop.keyframe, loop.match, options_.fusion));
+  clock.lap("fuse");
+  publish();
+  return outcome;
+}
+
+void LocalMapping::take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times,
+                                const std::function<void()>& publish) {
+  StageClock clock(times);
+  backend_.take_in_full(std::move(result), closings_then);
+  clock.lap("take_in_full_bundle");
+  publish();
+}
+
+void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& publish) {
+  if (!wants_full_bundle(backend_.view(), options_.backend.full)) return;
+  StageClock clock(times);
+  BundleResult result = solve_full(backend_.view(), options_.backend.full);
+  clock.lap("full_bundle");
+  take_in_full(std::move(result), backend_.closings(), times, publish);
+}
+
+}  // namespace hybrid_slam

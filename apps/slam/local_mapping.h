@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "apps/io/stage_times.h"
+#include "apps/slam/inputs.h"
+#include "apps/slam/slam_options.h"
+#include "backend/backend.h"
+#include "frontend/mapping/culling.h"
+#include "frontend/tracking/tracked_frame.h"
+
+namespace hybrid_slam {
+
+// A frame that shall become a keyframe, and what tracking counted since the last one.
+struct MappingJob {
+  CameraKind camera = CameraKind::kStereo;
+  NewKeyframe keyframe;
+  Rigid3d reference_from_world;  // pose of keyframe.reference in the map it was tracked in
+  std::vector<LandmarkCount> counts;
+
+  std::int64_t frame_index() const { return keyframe.observations->frame_index; }
+};
+
+// How often tracking saw each landmark since the last keyframe: no larger than the part of the map
+// that was in view, however long no keyframe comes.
+class LandmarkCounts {
+ public:
+  void add(const SeenLandmarks& frame);
+
+  // Ascending by landmark; begins anew.
+  std::vector<LandmarkCount> take();
+
+ private:
+  std::map<LandmarkId, LandmarkCount> counts_;
+};
+
+// What happens for each new keyframe, step by step: the frontend decides, the backend applies and
+// optimises. Owns the map. Synchronous; one thread at a time.
+class LocalMapping {
+ public:
+  // Goes on with `map`, if that is not empty.
+  explicit LocalMapping(const SlamOptions& options, Map map = {});
+
+  // The map's camera of these numbers, or a new one.
+  CameraId camera_id(const Camera& camera);
+
+  // `publish` is called whenever the map is worth looking at: once it holds the keyframe, and at
+  // the end. `stop` cuts the bundle adjustment short.
+  KeyframeId process(const MappingJob& job, StageTimes& times, std::stop_token stop,
+                     const std::function<void()>& publish);
+
+  // Closes a verified loop: moves the map, joins the two sides and looks for more that they have in
+  // common. `publish` is called if it was closed.
+  LoopOutcome close(const LoopMeasurement& loop, StageTimes& times,
+                    const std::function<void()>& publish);
+
+  // How often the map was moved by a loop.
+  std::size_t closings() const { return backend_.closings(); }
+
+  // Takes in what solve_full() made of a snapshot, when that many loops had moved the map.
+  void take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times,
+                    const std::function<void()>& publish);
+
+  // The same at once, if the options want it for a map of this size.
+  void adjust_full(StageTimes& times, const std::function<void()>& publish);
+
+  std::shared_ptr<const MapSnapshot> snapshot() { return backend_.snapshot(); }
+  const Map& map() const { return backend_.map(); }
+
+ private:
+  SlamOptions options_;
+  Backend backend_;
+  LandmarkProbation probation_;
+  KeyframeUse use_;
+};
+
+}  // namespace hybrid_slam

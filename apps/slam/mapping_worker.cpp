@@ -1,0 +1,65 @@
+#include "apps/slam/mapping_worker.h"
+
+#include <utility>
+
+namespace hybrid_slam {
+
+MappingWorker::MappingWorker(LocalMapping& mapping, MappingEvents events)
+    : mapping_(mapping), events_(std::move(events)), tasks_(kKeyframeBacklog + kOthers) {
+  publish();
+  thread_ = std::jthread([this] { work(); });
+}
+
+void MappingWorker::hurry() {
+  const std::lock_guard lock(mutex_);
+  current_.request_stop();
+}
+
+void MappingWorker::finish() {
+  tasks_.close();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+void MappingWorker::rethrow() const {
+  if (failure_) {
+    std::rethrow_exception(failure_);
+  }
+}
+
+void MappingWorker::work() {
+  try {
+    while (auto task = tasks_.pop()) {
+      std::visit([this](auto& one) { run(one); }, *task);
+    }
+  } catch (...) {
+    failure_ = std::current_exception();
+    tasks_.close();
+  }
+  snapshots_.close();
+}
+
+void MappingWorker::run(MappingJob& job) {
+  std::stop_source stop;
+  {
+    const std::lock_guard lock(mutex_);
+    current_ = stop;
+  }
+  const KeyframeId id = mapping_.process(job, times_, stop.get_token(), [this] { publish(); });
+  events_.mapped({job.camera, job.frame_index(), id}, snapshots_.get());
+}
+
+void MappingWorker::run(LoopMeasurement& loop) {
+  const LoopOutcome outcome = mapping_.close(loop, times_, [this] { publish(); });
+  events_.looped(outcome, snapshots_.get(), mapping_.closings());
+}
+
+void MappingWorker::run(FullCorrection& correction) {
+  mapping_.take_in_full(std::move(correction.result), correction.loops_closed, times_,
+                        [this] { publish(); });
+  loops_adjusted_ = correction.loops_closed;
+  events_.adjusted(snapshots_.get());
+}
+
+}  // namespace hybrid_slam

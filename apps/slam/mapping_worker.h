@@ -1,0 +1,98 @@
+#pragma once
+
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+#include <variant>
+
+#include "apps/slam/channel.h"
+#include "apps/slam/local_mapping.h"
+#include "apps/slam/session_types.h"
+
+namespace hybrid_slam {
+
+// A bundle adjustment of everything, to be carried over the loops that were closed since its
+// snapshot.
+struct FullCorrection {
+  std::size_t loops_closed = 0;  // when the snapshot was taken
+  BundleResult result;
+};
+
+// What others learn from the mapping thread, in which they are called: they must not wait.
+struct MappingEvents {
+  std::function<void(const KeyframeResult&, const std::shared_ptr<const MapSnapshot>&)> mapped;
+  // With the map after it, and how many loops are closed now.
+  std::function<void(const LoopOutcome&, const std::shared_ptr<const MapSnapshot>&, std::size_t)>
+      looped;
+  std::function<void(const std::shared_ptr<const MapSnapshot>&)> adjusted;  // all of it
+};
+
+// The map's owner in a thread of its own. Keyframes, loops and corrections go in, snapshots come
+// out.
+class MappingWorker {
+ public:
+  MappingWorker(LocalMapping& mapping, MappingEvents events);
+  ~MappingWorker() { finish(); }
+
+  // Whether a keyframe would not have to wait. From the one thread that adds keyframes.
+  bool has_room() const { return tasks_.size() < kKeyframeBacklog; }
+
+  // False, and nothing is done, once this is finished or has failed (see rethrow()).
+  bool add(MappingJob job) { return tasks_.push(std::move(job)); }
+  bool add(LoopMeasurement loop) { return tasks_.push(std::move(loop)); }
+  bool add(FullCorrection correction) { return tasks_.push(std::move(correction)); }
+
+  // Where time presses, a keyframe is worth more than the last iterations of the one before: its
+  // adjustment is cut short. Before the new one is added, so that it cannot be the one that is
+  // stopped.
+  void hurry();
+
+  // Until the worker has begun with the last task it was given.
+  void wait_until_taken() { tasks_.wait_empty(); }
+
+  std::shared_ptr<const MapSnapshot> snapshot() const { return snapshots_.get(); }
+
+  // Until the map has begun, there is nothing to track against.
+  void wait_for_map(std::size_t version) const { snapshots_.next(version); }
+  std::size_t version() const { return snapshots_.version(); }
+
+  // What is queued is still done.
+  void finish();
+
+  // The map as it is. After finish(), for who went on with it.
+  void publish() { snapshots_.publish(mapping_.snapshot()); }
+
+  // After finish(): what the thread threw, if it did.
+  void rethrow() const;
+
+  // After finish().
+  const StageTimes& times() const { return times_; }
+  std::size_t loops_adjusted() const { return loops_adjusted_; }  // in the last full adjustment
+
+ private:
+  // Keyframes waiting for mapping; and room for a loop and for corrections, so that those who bring
+  // them do not keep keyframes out.
+  static constexpr std::size_t kKeyframeBacklog = 3;
+  static constexpr std::size_t kOthers = 3;
+
+  void work();
+  void run(MappingJob& job);
+  void run(LoopMeasurement& loop);
+  void run(FullCorrection& correction);
+
+  LocalMapping& mapping_;
+  MappingEvents events_;
+  Channel<std::variant<MappingJob, LoopMeasurement, FullCorrection>> tasks_;
+  Latest<MapSnapshot> snapshots_;
+  std::mutex mutex_;
+  std::stop_source current_;        // guarded by mutex_
+  StageTimes times_;                // the thread's own until finish()
+  std::size_t loops_adjusted_ = 0;  // likewise
+  std::exception_ptr failure_;      // likewise
+  std::jthread thread_;
+};
+
+}  // namespace hybrid_slam

@@ -1,0 +1,105 @@
+#include "apps/slam/recorder.h"
+
+#include <time.h>
+
+namespace hybrid_slam {
+namespace {
+
+double process_cpu_ms() {
+  timespec used{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
+}
+
+}  // namespace
+
+Rigid3d RunResult::cam_from_world(const FrameRecord& record) const {
+  if (record.keyframe) return map->cam_from_world(*record.keyframe);
+  return record.frame.cam_from_reference * map->cam_from_world(record.frame.reference);
+}
+
+Recorder::Recorder(RunResult& result, const ReplayHooks& hooks, std::size_t total)
+    : result_(result), hooks_(hooks), cpu_ms_(process_cpu_ms()) {
+  progress_.total = total;
+}
+
+void Recorder::corrupt(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  ++result_.frames.read;
+  ++result_.frames.corrupt;
+  warn(reason);
+  report();
+}
+
+void Recorder::fisheye_missing(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  ++result_.fisheye_frames.read;
+  ++result_.fisheye_frames.corrupt;
+  warn(reason);
+}
+
+void Recorder::dropped_unread() {
+  const std::lock_guard lock(mutex_);
+  ++result_.frames.dropped;
+}
+
+void Recorder::failed(const SessionFailure& failure) {
+  const std::lock_guard lock(mutex_);
+  warn(failure.text);
+  if (failure.internal) result_.internal_errors.push_back(failure.text);
+}
+
+void Recorder::warn(const std::string& text) {
+  if (hooks_.warning) hooks_.warning(text);
+}
+
+void Recorder::tracked(const FrameResult& frame) {
+  const std::lock_guard lock(mutex_);
+  const bool stereo = frame.camera == CameraKind::kStereo;
+  FrameCounts& counts = stereo ? result_.frames : result_.fisheye_frames;
+  auto& records = stereo ? result_.records : result_.fisheye_records;
+  ++counts.read;
+  ++(frame.has_pose() ? counts.tracked : counts.lost);
+  record_of_frame_[{frame.camera, frame.index}] = records.size();
+  records.push_back({frame.tracked, std::nullopt, 0});
+  progress_.keyframes = frame.keyframes;
+  progress_.landmarks = frame.landmarks;
+  if (!stereo) return;
+  add_cpu_time();
+  report();
+}
+
+void Recorder::became_keyframe(const KeyframeResult& keyframe) {
+  const std::lock_guard lock(mutex_);
+  auto& records =
+      keyframe.camera == CameraKind::kStereo ? result_.records : result_.fisheye_records;
+  records[record_of_frame_.at({keyframe.camera, keyframe.index})].keyframe = keyframe.id;
+}
+
+void Recorder::looped(const LoopRecord& loop) {
+  const std::lock_guard lock(mutex_);
+  result_.loops.push_back(loop);
+}
+
+void Recorder::add_cpu_time() {
+  const double now = process_cpu_ms();
+  result_.records.back().cpu_ms += now - cpu_ms_;
+  cpu_ms_ = now;
+}
+
+void Recorder::finish(const SessionCounts& counts, bool cancelled) {
+  const std::lock_guard lock(mutex_);
+  result_.frames.dropped += static_cast<int>(counts.stereo.dropped);
+  result_.fisheye_frames.dropped = static_cast<int>(counts.fisheye.dropped);
+  result_.cancelled = cancelled;
+  if (!result_.records.empty()) add_cpu_time();
+}
+
+void Recorder::report() {
+  if (!hooks_.progress) return;
+  progress_.frames = result_.frames;
+  progress_.done = static_cast<std::size_t>(result_.frames.read);
+  hooks_.progress(progress_);
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <utility>
+
+#include "apps/slam/replay.h"
+
+namespace hybrid_slam {
+
+// Keeps the books of a replay: counts, records, progress. Thread-safe.
+class Recorder {
+ public:
+  Recorder(RunResult& result, const ReplayHooks& hooks, std::size_t total);
+
+  void corrupt(const std::string& reason);
+  void fisheye_missing(const std::string& reason);
+  void dropped_unread();
+  void failed(const SessionFailure& failure);
+  void tracked(const FrameResult& frame);
+  void became_keyframe(const KeyframeResult& keyframe);
+  void looped(const LoopRecord& loop);
+  void finish(const SessionCounts& counts, bool cancelled);
+
+ private:
+  void warn(const std::string& text);
+  void report();
+  void add_cpu_time();
+
+  RunResult& result_;
+  const ReplayHooks& hooks_;
+  ReplayProgress progress_;
+  double cpu_ms_;  // that the process had used when the last frame was done
+  std::map<std::pair<CameraKind, std::int64_t>, std::size_t> record_of_frame_;
+  std::mutex mutex_;  // guards all of it
+};
+
+}  // namespace hybrid_slam

@@ -1,0 +1,96 @@
+#include "apps/slam/replay.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <utility>
+
+#include "apps/slam/recorder.h"
+#include "cameras/input_error.h"
+
+namespace hybrid_slam {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+SessionObservers observers_of(Recorder& recorder) {
+  SessionObservers observers;
+  observers.frame = [&](const FrameResult& frame) { recorder.tracked(frame); };
+  observers.keyframe = [&](const KeyframeResult& keyframe) { recorder.became_keyframe(keyframe); };
+  observers.loop = [&](const LoopRecord& loop) { recorder.looped(loop); };
+  observers.failure = [&](const SessionFailure& failure) { recorder.failed(failure); };
+  return observers;
+}
+
+// Waits until it is due. False if no further image shall come.
+bool wait_until(Clock::time_point due, const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any wake;
+  std::unique_lock lock(mutex);
+  wake.wait_until(lock, stop, due, [] { return false; });
+  return !stop.stop_requested();
+}
+
+// All moments, one after the other; each when it is due, if there is a rate. Where reading cannot
+// keep up with it, those that have been due for two periods are dropped unread.
+void push_all(const FrameSource& source, std::size_t total, double rate,
+              const std::stop_token& stop, Session& session, Recorder& recorder) {
+  const auto start = Clock::now();
+  for (std::size_t i = 0; i < total && !stop.stop_requested(); ++i) {
+    const std::chrono::duration<double> age(rate > 0 ? static_cast<double>(i) / rate : 0);
+    const auto due = start + std::chrono::duration_cast<Clock::duration>(age);
+    if (rate > 0 && Clock::now() - due > std::chrono::duration<double>(2 / rate)) {
+      recorder.dropped_unread();
+      continue;
+    }
+    Moment moment = source.read(i);
+    if (rate > 0 && !wait_until(due, stop)) return;
+    if (!moment.error.empty()) recorder.corrupt(moment.error);
+    if (!moment.fisheye_error.empty()) recorder.fisheye_missing(moment.fisheye_error);
+    for (SensorInput& input : moment.inputs) {
+      if (session.push(std::move(input)) == PushResult::kClosed) return;
+    }
+  }
+}
+
+}  // namespace
+
+Moment ImageFrameSource::read(std::size_t index) const {
+  Moment moment;
+  try {
+    FrameImages images = sequence_.read(index);
+    const Nanoseconds time = to_nanoseconds(images.time);
+    moment.inputs.push_back(StereoImages{time, std::move(images.left), std::move(images.right)});
+    if (!images.fisheye.empty()) {
+      moment.inputs.push_back(FisheyeImage{time, std::move(images.fisheye)});
+    }
+    moment.fisheye_error = std::move(images.fisheye_error);
+  } catch (const InputError& error) {
+    moment.error = error.what();
+  }
+  return moment;
+}
+
+RunResult replay(const FrameSource& source, const SlamOptions& options, ReplayOptions replay,
+                 const ReplayHooks& hooks, Map map) {
+  RunResult result;
+  const std::size_t total = replay.moments_of(source.size());
+  Recorder recorder(result, hooks, total);
+  replay.session.drop = replay.rate > 0;
+  Session session(source.cameras(), options, std::move(replay.session), observers_of(recorder),
+                  std::move(map));
+  {
+    const std::stop_callback cancel(hooks.cancelled, [&] { session.cancel(); });
+    push_all(source, total, replay.rate, hooks.cancelled, session, recorder);
+    session.finish();
+  }
+  recorder.finish(session.counts(), hooks.cancelled.stop_requested());
+  result.map = session.map();
+  result.times = session.times();
+  result.upsampling = session.upsampling();
+  result.upsampled = session.upsamples();
+  result.file_info = session.file_info();
+  return result;
+}
+
+}  // namespace hybrid_slam

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "apps/slam/session.h"
+#include "frontend/input/image_sequence.h"
+
+namespace hybrid_slam {
+
+// Inputs of one moment, all of one time, or why there are none.
+struct Moment {
+  std::vector<SensorInput> inputs;
+  std::string error;          // the stereo pair cannot be read; empty: it can
+  std::string fisheye_error;  // likewise, the fisheye's image
+};
+
+// What is replayed: images of a dataset, or a simulation of features.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  virtual std::size_t size() const = 0;
+  virtual CameraRig cameras() const = 0;
+  virtual Moment read(std::size_t index) const = 0;
+};
+
+// Images of a sequence, which must outlive it.
+class ImageFrameSource final : public FrameSource {
+ public:
+  explicit ImageFrameSource(const ImageSequence& sequence) : sequence_(sequence) {}
+
+  std::size_t size() const override { return sequence_.size(); }
+  CameraRig cameras() const override { return {sequence_.info().stereo, sequence_.info().fisheye}; }
+  Moment read(std::size_t index) const override;
+
+ private:
+  const ImageSequence& sequence_;
+};
+
+struct ReplayOptions {
+  // Its checkpoint is called as said there; what it throws is an internal error as well.
+  SessionOptions session;
+  std::size_t limit = 0;  // moments to process at most; 0: all
+  // Realtime: moments per second, as a camera gives them; frames are dropped when the session is
+  // behind. 0: they wait for it.
+  double rate = 0;
+
+  // How many moments are processed of those that there are.
+  std::size_t moments_of(std::size_t available) const {
+    return limit > 0 ? std::min(limit, available) : available;
+  }
+};
+
+struct FrameCounts {
+  int read = 0;  // handed to the session, corrupt ones included
+  int tracked = 0;
+  int lost = 0;  // the map not yet begun included
+  int dropped = 0;
+  int corrupt = 0;
+};
+
+// What stays of a tracked frame.
+struct FrameRecord {
+  TrackedFrame frame;                  // without its keyframe and counts
+  std::optional<KeyframeId> keyframe;  // the keyframe it became
+  // Of a stereo frame: of the whole process, all its threads, from when the stereo frame before was
+  // tracked [ms]. The first one's has the start of the run, the last one's the end.
+  double cpu_ms = 0;
+};
+
+struct ReplayProgress {
+  std::size_t done = 0;
+  std::size_t total = 0;
+  FrameCounts frames;
+  std::size_t keyframes = 0;
+  std::size_t landmarks = 0;
+};
+
+// What a replay needs from outside. When `cancelled` is requested, at any moment, the run ends in
+// order, with what it has. The two functions are called by one thread at a time, not always the
+// same.
+struct ReplayHooks {
+  std::function<void(const ReplayProgress&)> progress;  // after each stereo frame
+  std::function<void(const std::string&)> warning;      // one line each
+  std::stop_token cancelled;
+};
+
+struct RunResult {
+  FrameCounts frames;
+  std::vector<FrameRecord> records;  // every stereo frame that was tracked or lost, in order
+  FrameCounts fisheye_frames;        // of those that came with a stereo frame that could be read
+  std::vector<FrameRecord> fisheye_records;
+  std::shared_ptr<const MapSnapshot> map;
+  std::vector<LoopRecord> loops;  // places proposed, in the order in which they were looked at
+  std::optional<UpsamplingEvidence> upsampling;  // none where there were no images
+  bool upsampled = false;
+  MapFileInfo file_info;  // of the map, for save_map()
+  StageTimes times;
+  bool cancelled = false;
+  std::vector<std::string> internal_errors;  // that did not end the run; each was a warning, too
+
+  // Final pose of a tracked frame, through its reference keyframe.
+  Rigid3d cam_from_world(const FrameRecord& record) const;
+};
+
+// Pushes a source through a session, from the first moment to the last. Goes on with `map`, if that
+// is not empty.
+RunResult replay(const FrameSource& source, const SlamOptions& options, ReplayOptions replay,
+                 const ReplayHooks& hooks, Map map = {});
+
+}  // namespace hybrid_slam
