@@ -89,11 +89,11 @@ void FrameStream::append(SensorInput input) {
   Released released{camera_of(input), moment_, first, {}};
   if (auto* pair = std::get_if<StereoImages>(&input)) {
     auto shared = std::make_shared<const StereoImages>(std::move(*pair));
-    if (first_.stereo.size() < FirstImages::kStereo) first_.stereo.push_back(shared);
+    if (first && first_.stereo.size() < FirstImages::kStereo) first_.stereo.push_back(shared);
     released.image = std::move(shared);
   } else if (auto* fisheye = std::get_if<FisheyeImage>(&input)) {
     auto shared = std::make_shared<const FisheyeImage>(std::move(*fisheye));
-    if (first_.fisheye.size() < FirstImages::kFisheye) first_.fisheye.push_back(shared);
+    if (first && first_.fisheye.size() < FirstImages::kFisheye) first_.fisheye.push_back(shared);
     released.image = std::move(shared);
   } else {
     released.image = std::move(std::get<ExtractedFrame>(input));

@@ -73,7 +73,8 @@ void Recorder::became_keyframe(const KeyframeResult& keyframe) {
   const std::lock_guard lock(mutex_);
   auto& records =
       keyframe.camera == CameraKind::kStereo ? result_.records : result_.fisheye_records;
-  records[record_of_frame_.at({keyframe.camera, keyframe.index})].keyframe = keyframe.id;
+  const auto record = record_of_frame_.find({keyframe.camera, keyframe.index});
+  if (record != record_of_frame_.end()) records[record->second].keyframe = keyframe.id;
 }
 
 void Recorder::looped(const LoopRecord& loop) {
@@ -92,6 +93,10 @@ void Recorder::finish(const SessionCounts& counts, bool cancelled) {
   result_.frames.dropped += static_cast<int>(counts.stereo.dropped);
   result_.fisheye_frames.dropped = static_cast<int>(counts.fisheye.dropped);
   result_.cancelled = cancelled;
+  if (counts.overruns > 0) {  // a terminal that stands still, say
+    warn(std::to_string(counts.overruns) +
+         " events came too fast to be recorded: frames are missing");
+  }
   if (!result_.records.empty()) add_cpu_time();
 }
 
