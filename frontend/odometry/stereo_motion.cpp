@@ -9,8 +9,7 @@
 
 #include <Eigen/LU>
 
-#include "cameras/geometry/se3.h"
-#include "frontend/pose/normal_equations.h"
+#include "frontend/pose/damped_gauss_newton.h"
 #include "frontend/pose/random_sampler.h"
 #include "frontend/pose/rigid_alignment.h"
 
@@ -18,8 +17,7 @@ namespace hybrid_slam {
 namespace {
 
 constexpr double kHypothesisConverged = 1e-6;  // step [m, rad]
-constexpr double kRefinementConverged = 1e-8;
-constexpr int kMaxRefinementIterations = 100;
+constexpr GaussNewtonStop kRefinementStop{100, 1e-8};
 constexpr double kLeastVariance = 1e-6;  // [px^2]: no measurement is perfect
 constexpr int kMaxRefinements = 5;       // inliers are chosen anew before each
 
@@ -113,35 +111,40 @@ class StereoMotionSolver {
     return inliers;
   }
 
-  // Gauss-Newton on the points named. None if it does not converge.
-  std::optional<Rigid3d> minimize(Rigid3d motion, std::span<const int> indices, int iterations,
-                                  double converged) const {
-    for (int i = 0; i < iterations; ++i) {
-      PoseNormalEquations equations;
-      const Eigen::Matrix3d rotation = motion.rotation().toRotationMatrix();
-      const Eigen::Vector3d translation = motion.translation();
-      for (const int index : indices) {
-        const Point& p = points_[static_cast<std::size_t>(index)];
-        const Eigen::Vector3d point = rotation * p.in_previous + translation;
-        Eigen::Vector3d m;
-        Eigen::Matrix<double, 3, 3, Eigen::RowMajor> d_point;
-        if (!RectifiedStereo::project_with_jacobians(params_.data(), point.data(), m.data(),
-                                                     d_point.data(), nullptr)) {
-          return std::nullopt;
-        }
-        // Both rows are measured, and the model has one: their mean, with twice the weight.
-        const double v = 0.5 * (p.measured[1] + p.measured[3]);
-        Eigen::Vector3d residual(m[0] - p.measured[0], m[1] - v, m[2] - p.measured[2]);
-        residual[1] *= std::numbers::sqrt2;
-        d_point.row(1) *= std::numbers::sqrt2;
-        equations.add<3>(pose_jacobian<3>(d_point, point), residual, p.squared_weight);
+  // None if one of the points named cannot be projected.
+  std::optional<NormalEquations<6>> linearize(const Rigid3d& motion,
+                                              std::span<const int> indices) const {
+    NormalEquations<6> equations;
+    const Eigen::Matrix3d rotation = motion.rotation().toRotationMatrix();
+    const Eigen::Vector3d translation = motion.translation();
+    for (const int index : indices) {
+      const Point& p = points_[static_cast<std::size_t>(index)];
+      const Eigen::Vector3d point = rotation * p.in_previous + translation;
+      Eigen::Vector3d m;
+      Eigen::Matrix<double, 3, 3, Eigen::RowMajor> d_point;
+      if (!RectifiedStereo::project_with_jacobians(params_.data(), point.data(), m.data(),
+                                                   d_point.data(), nullptr)) {
+        return std::nullopt;
       }
-      const std::optional<Vector6d> step = equations.solve(0);
-      if (!step) return std::nullopt;
-      motion = se3_exp(*step) * motion;
-      if (step->norm() < converged) return motion;
+      // Both rows are measured, and the model has one: their mean, with twice the weight.
+      const double v = 0.5 * (p.measured[1] + p.measured[3]);
+      Eigen::Vector3d residual(m[0] - p.measured[0], m[1] - v, m[2] - p.measured[2]);
+      residual[1] *= std::numbers::sqrt2;
+      d_point.row(1) *= std::numbers::sqrt2;
+      equations.add<3>(pose_jacobian<3>(d_point, point), residual, p.squared_weight);
+      equations.cost += p.squared_weight * residual.squaredNorm();
     }
-    return std::nullopt;
+    return equations;
+  }
+
+  // On the points named. None if it does not converge.
+  std::optional<Rigid3d> minimize(const Rigid3d& motion, std::span<const int> indices,
+                                  const GaussNewtonStop& stop) const {
+    const auto minimum = damped_gauss_newton<6>(
+        motion, [&](const Rigid3d& pose) { return linearize(pose, indices); }, left_perturbed,
+        stop);
+    if (!minimum || !minimum->converged) return std::nullopt;
+    return minimum->state;
   }
 
   // The hypothesis of three points: aligned in closed form, then refined on what was measured.
@@ -154,7 +157,7 @@ class StereoMotionSolver {
     }
     const std::optional<Rigid3d> start = align_rigid(previous, current);
     if (!start) return std::nullopt;
-    return minimize(*start, sample, options_.max_gauss_newton_iterations, kHypothesisConverged);
+    return minimize(*start, sample, {options_.max_gauss_newton_iterations, kHypothesisConverged});
   }
 
   std::optional<Rigid3d> search() {
@@ -274,8 +277,7 @@ class StereoMotionSolver {
     std::vector<int> inliers = find_inliers(motion);
     for (int i = 0; i < kMaxRefinements; ++i) {
       if (static_cast<int>(inliers.size()) < std::max(3, options_.min_inliers)) return std::nullopt;
-      const auto refined =
-          minimize(motion, inliers, kMaxRefinementIterations, kRefinementConverged);
+      const auto refined = minimize(motion, inliers, kRefinementStop);
       if (!refined) return std::nullopt;
       motion = *refined;
       std::vector<int> now = find_inliers(motion);

@@ -17,7 +17,7 @@ struct StereoOdometerOptions {
   int ransac_iterations = 200;
   double inlier_threshold = 2.0;  // [px] over the four coordinates
   int min_inliers = 6;
-  int max_gauss_newton_iterations = 20;
+  int max_gauss_newton_iterations = 20;  // of a hypothesis; damped where a step does not descend
   std::uint64_t seed = 0;
 
   // Empty if the values can be used, else what is wrong.
@@ -40,10 +40,10 @@ struct StereoMotionSolution {
 };
 
 // Ego-motion of a stereo pair as VISO2 finds it: points triangulated from the previous frame,
-// hypotheses from three of them, Gauss-Newton on the four coordinates in the current frame with the
-// weights 1 / (|u - cu| / cu + 0.05) of the left image. Correspondences that are not finite or have
-// no positive disparity in the previous frame are never inliers. None if fewer than min_inliers
-// agree or they leave the motion open. Same seed, same result.
+// hypotheses from three of them, least squares in the four coordinates in the current frame with
+// the weights 1 / (|u - cu| / cu + 0.05) of the left image. Correspondences that are not finite or
+// have no positive disparity in the previous frame are never inliers. None if fewer than
+// min_inliers agree or they leave the motion open. Same seed, same result.
 std::optional<StereoMotionSolution> solve_stereo_motion(
     const Calibrated<RectifiedStereo>& camera,
     std::span<const StereoCorrespondence> correspondences, const StereoOdometerOptions& options);

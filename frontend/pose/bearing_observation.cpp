@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "cameras/geometry/se3.h"
+#include "frontend/pose/damped_gauss_newton.h"
 
 namespace hybrid_slam {
 namespace {
@@ -26,31 +26,18 @@ BearingObservation observe(const double* params, const PoseObservation& observat
   return result;
 }
 
-struct LinearizedBearings {
-  PoseNormalEquations equations;
-  double cost = 0;
-};
-
-LinearizedBearings linearize(std::span<const BearingObservation> observations,
+NormalEquations<6> linearize(std::span<const BearingObservation> observations,
                              const Rigid3d& cam_from_world) {
-  LinearizedBearings result;
+  NormalEquations<6> equations;
   const Eigen::Matrix3d rotation = cam_from_world.rotation().toRotationMatrix();
   const Eigen::Vector3d translation = cam_from_world.translation();
   for (const BearingObservation& o : observations) {
     const Eigen::Vector3d point = rotation * o.point_in_world + translation;
-    if (!(o.bearing.dot(point) > 0)) {  // its bound has no slope
-      result.cost += o.whitening.squaredNorm();
-      continue;
-    }
-    const double inverse_distance = 1 / point.norm();
-    const Eigen::Vector3d direction = inverse_distance * point;
-    const Eigen::Vector2d residual = o.whitening * direction;
-    const Eigen::Matrix<double, 2, 3, Eigen::RowMajor> d_point =
-        inverse_distance * (o.whitening - residual * direction.transpose());
-    result.equations.add<2>(pose_jacobian<2>(d_point, point), residual, 1);
-    result.cost += residual.squaredNorm();
+    const std::optional<DirectionResidual> seen = direction_residual(o, point);
+    if (seen) equations.add<2>(pose_jacobian<2>(seen->d_point, point), seen->residual, 1);
+    equations.cost += seen ? seen->residual.squaredNorm() : o.whitening.squaredNorm();
   }
-  return result;
+  return equations;
 }
 
 }  // namespace
@@ -84,33 +71,12 @@ double bearing_cost(std::span<const BearingObservation> observations,
 
 std::optional<Rigid3d> refine_on_bearings(std::span<const BearingObservation> observations,
                                           const Rigid3d& initial_cam_from_world) {
-  constexpr int kIterations = 30;
-  constexpr double kConverged = 1e-7;  // step [m, rad]; the one after it would be far smaller
-  constexpr double kFirstDamping = 1e-3;
-  constexpr double kMaxDamping = 1e6;
-  Rigid3d pose = initial_cam_from_world;
-  LinearizedBearings at_pose = linearize(observations, pose);
-  double damping = 0;
-  for (int i = 0; i < kIterations && damping < kMaxDamping; ++i) {
-    const std::optional<Vector6d> step = at_pose.equations.solve(damping);
-    if (!step) break;
-    const Rigid3d trial = se3_exp(*step) * pose;
-    LinearizedBearings at_trial = linearize(observations, trial);
-    // The last steps change the cost by rounding alone.
-    if (at_trial.cost <= at_pose.cost * (1 + 1e-12)) {
-      pose = trial;
-      at_pose = at_trial;
-      if (damping == 0 && step->norm() < kConverged) break;
-      damping = damping > kFirstDamping ? damping / 10 : 0;
-    } else {
-      damping = damping > 0 ? damping * 10 : kFirstDamping;
-    }
-  }
-  if (!std::isfinite(at_pose.cost) ||
-      !is_determined(Matrix6d(at_pose.equations.information.selfadjointView<Eigen::Lower>()))) {
-    return std::nullopt;
-  }
-  return pose;
+  constexpr GaussNewtonStop kStop{30, 1e-7};  // [m, rad]; the step after it would be far smaller
+  const auto minimum = damped_gauss_newton<6>(
+      initial_cam_from_world, [&](const Rigid3d& pose) { return linearize(observations, pose); },
+      left_perturbed, kStop);
+  if (!minimum || !is_determined(minimum->equations.full_information())) return std::nullopt;
+  return minimum->state;
 }
 
 }  // namespace hybrid_slam

@@ -7,7 +7,6 @@
 #include <Eigen/Core>
 
 #include "cameras/camera.h"
-#include "frontend/pose/normal_equations.h"
 #include "frontend/pose/pose_refinement.h"
 
 namespace hybrid_slam {
@@ -41,7 +40,24 @@ inline double direction_chi2(const BearingObservation& seen, const Eigen::Vector
   return (seen.whitening * point_in_cam).squaredNorm() / point_in_cam.squaredNorm();
 }
 
-// The same of the observation's own point, at a pose.
+// The residual itself, with its derivative by the point.
+struct DirectionResidual {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> d_point;
+};
+
+// None in the half space opposite to the bearing: the bound has no slope.
+inline std::optional<DirectionResidual> direction_residual(const BearingObservation& seen,
+                                                           const Eigen::Vector3d& point_in_cam) {
+  if (!(seen.bearing.dot(point_in_cam) > 0)) return std::nullopt;
+  const double inverse_distance = 1 / point_in_cam.norm();
+  const Eigen::Vector3d direction = inverse_distance * point_in_cam;
+  const Eigen::Vector2d residual = seen.whitening * direction;
+  return DirectionResidual{residual,
+                           inverse_distance * (seen.whitening - residual * direction.transpose())};
+}
+
+// direction_chi2 of the observation's own point, at a pose.
 inline double bearing_chi2(const BearingObservation& observation, const Eigen::Matrix3d& rotation,
                            const Eigen::Vector3d& translation) {
   return direction_chi2(observation, rotation * observation.point_in_world + translation);
@@ -51,8 +67,8 @@ inline double bearing_chi2(const BearingObservation& observation, const Eigen::M
 double bearing_cost(std::span<const BearingObservation> observations,
                     const Rigid3d& cam_from_world);
 
-// The pose nearby that minimises the sum of squared residuals: Gauss-Newton, damped where a step
-// would raise the cost. None if the observations leave the pose open or are not finite.
+// The pose nearby that minimises the sum of squared residuals, by damped_gauss_newton. None if the
+// observations leave the pose open or are not finite.
 std::optional<Rigid3d> refine_on_bearings(std::span<const BearingObservation> observations,
                                           const Rigid3d& initial_cam_from_world);
 

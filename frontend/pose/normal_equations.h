@@ -6,21 +6,26 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
-#include "cameras/geometry/rigid3d.h"
+#include "cameras/geometry/se3.h"
 
 namespace hybrid_slam {
 
-// Least squares in the six unknowns of one pose, perturbed on the left: (translation, rotation).
-struct PoseNormalEquations {
-  Matrix6d information = Matrix6d::Zero();  // sum of w J^T J; the lower triangle while summing
-  Vector6d gradient = Vector6d::Zero();     // sum of w J^T r
+// Least squares in N unknowns, linearised: cost + 2 gradient . step + step . information step.
+template <int N>
+struct NormalEquations {
+  using Step = Eigen::Matrix<double, N, 1>;
+  using Matrix = Eigen::Matrix<double, N, N>;
 
-  // Adds N residuals r with their Jacobian (row-major N x 6) and a common weight.
-  template <int N>
-  void add(const Eigen::Matrix<double, N, 6, Eigen::RowMajor>& jacobian,
-           const Eigen::Matrix<double, N, 1>& residual, double weight) {
-    for (int row = 0; row < N; ++row) {
-      for (int i = 0; i < 6; ++i) {
+  Matrix information = Matrix::Zero();  // sum of w J^T J; the lower triangle alone
+  Step gradient = Step::Zero();         // sum of w J^T r
+  double cost = 0;                      // what is minimised: the sum of the losses, by the caller
+
+  // Adds residuals r with their Jacobian (row-major) and a common weight.
+  template <int Rows>
+  void add(const Eigen::Matrix<double, Rows, N, Eigen::RowMajor>& jacobian,
+           const Eigen::Matrix<double, Rows, 1>& residual, double weight) {
+    for (int row = 0; row < Rows; ++row) {
+      for (int i = 0; i < N; ++i) {
         const double weighted = weight * jacobian(row, i);
         gradient[i] += weighted * residual[row];
         for (int j = 0; j <= i; ++j) information(i, j) += weighted * jacobian(row, j);
@@ -28,12 +33,14 @@ struct PoseNormalEquations {
     }
   }
 
+  Matrix full_information() const { return information.template selfadjointView<Eigen::Lower>(); }
+
   // The step that minimises the linearised cost, each diagonal entry enlarged by the factor
   // 1 + damping. None if it is not finite.
-  std::optional<Vector6d> solve(double damping) const {
-    Matrix6d damped = information.selfadjointView<Eigen::Lower>();
+  std::optional<Step> solve(double damping) const {
+    Matrix damped = full_information();
     damped.diagonal() *= 1 + damping;
-    const Vector6d step = -damped.ldlt().solve(gradient);
+    const Step step = -damped.ldlt().solve(gradient);
     if (!step.allFinite()) return std::nullopt;
     return step;
   }
@@ -63,6 +70,11 @@ Eigen::Matrix<double, N, 6, Eigen::RowMajor> pose_jacobian(
     jacobian.row(row) << d.transpose(), point_in_cam.cross(d).transpose();
   }
   return jacobian;
+}
+
+// The pose after a step of the unknowns.
+inline Rigid3d left_perturbed(const Vector6d& step, const Rigid3d& pose) {
+  return se3_exp(step) * pose;
 }
 
 }  // namespace hybrid_slam

@@ -10,7 +10,7 @@
 
 #include "cameras/geometry/se3.h"
 #include "factors/reprojection.h"
-#include "frontend/pose/normal_equations.h"
+#include "frontend/pose/damped_gauss_newton.h"
 
 namespace hybrid_slam {
 namespace {
@@ -18,8 +18,6 @@ namespace {
 constexpr int kMinObservations = 3;
 constexpr double kConverged = 1e-9;         // step [m, rad] after which a minimisation is done
 constexpr double kRoughlyConverged = 1e-5;  // the same where another round follows anyway
-constexpr double kFirstDamping = 1e-4;
-constexpr double kMaxDamping = 1e8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool has_right(const PoseObservation& observation) {
@@ -43,11 +41,6 @@ HuberWeight huber(double s, double chi2) {
   const double threshold = std::sqrt(chi2);
   return {2 * threshold * norm - chi2, threshold / norm};
 }
-
-struct LinearizedPose {
-  PoseNormalEquations equations;
-  double cost = 0;  // sum of rho(s)
-};
 
 template <ProjectionModel M>
 class PoseRefiner {
@@ -124,8 +117,8 @@ class PoseRefiner {
   }
 
   // None if one of the inliers cannot be projected from this pose.
-  std::optional<LinearizedPose> linearize(const Rigid3d& cam_from_world, bool robust) const {
-    LinearizedPose result;
+  std::optional<NormalEquations<6>> linearize(const Rigid3d& cam_from_world, bool robust) const {
+    NormalEquations<6> equations;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       if (!inlier_[i]) continue;
       const PoseObservation& o = observations_[i];
@@ -141,49 +134,34 @@ class PoseRefiner {
         }
         const double s = residual.squaredNorm();
         const HuberWeight loss = robust ? huber(s, threshold(o)) : HuberWeight{s, 1};
-        result.cost += loss.cost;
-        result.equations.add<kDim>(jacobian, residual, loss.weight);
+        equations.cost += loss.cost;
+        equations.add<kDim>(jacobian, residual, loss.weight);
         return true;
       });
       if (!projected) return std::nullopt;
     }
-    if (!std::isfinite(result.cost)) return std::nullopt;
-    return result;
+    if (!std::isfinite(equations.cost)) return std::nullopt;
+    return equations;
   }
 
-  // Gauss-Newton over the inliers until a step is shorter than `converged`; damped where a step
-  // would raise the cost.
+  // Over the inliers, until a step is shorter than `converged`.
   Rigid3d minimize(const Rigid3d& initial, bool robust, double converged) const {
-    Rigid3d pose = initial;
-    std::optional<LinearizedPose> at_pose = linearize(pose, robust);
-    double damping = 0;
-    for (int i = 0; i < options_.iterations && at_pose && damping < kMaxDamping; ++i) {
-      const std::optional<Vector6d> step = at_pose->equations.solve(damping);
-      if (step && damping == 0 && step->norm() < converged) return se3_exp(*step) * pose;
-      std::optional<LinearizedPose> at_trial;
-      if (step) at_trial = linearize(se3_exp(*step) * pose, robust);
-      // The last steps change the cost by rounding alone.
-      if (at_trial && at_trial->cost <= at_pose->cost * (1 + 1e-12)) {
-        pose = se3_exp(*step) * pose;
-        at_pose = std::move(at_trial);
-        damping = damping > kFirstDamping ? damping / 10 : 0;
-      } else {
-        damping = damping > 0 ? damping * 10 : kFirstDamping;
-      }
-    }
-    return pose;
+    const auto minimum = damped_gauss_newton<6>(
+        initial, [&](const Rigid3d& pose) { return linearize(pose, robust); }, left_perturbed,
+        {options_.iterations, converged});
+    return minimum ? minimum->state : initial;
   }
 
   void summarize(const Rigid3d& initial, PoseRefinementResult* result) {
     result->information.setZero();
-    const std::optional<LinearizedPose> final =
+    const std::optional<NormalEquations<6>> final =
         inliers_ >= kMinObservations ? linearize(result->cam_from_world, false) : std::nullopt;
     if (!final) {
       result->cam_from_world = initial;
       result->inlier.assign(observations_.size(), 0);
       return;
     }
-    result->information = final->equations.information.template selfadjointView<Eigen::Lower>();
+    result->information = final->full_information();
     result->inlier = std::move(inlier_);
     result->inliers = inliers_;
     result->rms = std::sqrt(final->cost / residual_count(result->inlier));

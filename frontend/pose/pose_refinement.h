@@ -32,8 +32,8 @@ struct PoseRefinementResult {
   double rms = 0;        // of the whitened inlier residuals
 };
 
-// Pose of one camera from known points: dense Gauss-Newton (Levenberg damping where a step would
-// not descend) on the residuals of factors/reprojection_factor.h, six unknowns. The measurements
+// Pose of one camera from known points: damped_gauss_newton on the residuals of
+// factors/reprojection.h, six unknowns. The measurements
 // are (u, v, u_right) for a rectified stereo pair where u_right is given, else (u, v). Never
 // returns a pose that is not finite: with too few usable observations the initial one comes back
 // and `inliers` says so.

@@ -2,14 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "cameras/geometry/so3.h"
-#include "frontend/pose/normal_equations.h"
+#include "frontend/pose/damped_gauss_newton.h"
 #include "frontend/pose/random_sampler.h"
 #include "frontend/pose/rigid_alignment.h"
 
@@ -17,7 +14,6 @@ namespace hybrid_slam {
 namespace {
 
 using Pairs = std::span<const PointPair>;
-using Rows37d = Eigen::Matrix<double, 3, 7>;
 
 // The worse of the two ways.
 double pair_chi2(const PointPair& pair, const Sim3d& a_from_b, const Sim3d& b_from_a) {
@@ -43,95 +39,58 @@ Consensus consensus_at(Pairs pairs, const Sim3d& a_from_b, double chi2) {
   return result;
 }
 
-// Least squares in the seven unknowns of a similarity, perturbed on the left: translation,
-// rotation, log scale.
-struct SimilarityEquations {
-  Matrix7d information = Matrix7d::Zero();
-  Vector7d gradient = Vector7d::Zero();
-  double cost = 0;
-
-  // A direction's residual, and how the point moves with the unknowns.
-  void add(const BearingObservation& seen, const Eigen::Vector3d& point, const Rows37d& d_point) {
-    if (!(seen.bearing.dot(point) > 0)) {  // its bound has no slope
-      cost += seen.whitening.squaredNorm();
-      return;
-    }
-    const double inverse_distance = 1 / point.norm();
-    const Eigen::Vector3d direction = inverse_distance * point;
-    const Eigen::Vector2d residual = seen.whitening * direction;
-    const Eigen::Matrix<double, 2, 3> d_residual =
-        inverse_distance * (seen.whitening - residual * direction.transpose());
-    const Eigen::Matrix<double, 2, 7> jacobian = d_residual * d_point;
-    information += jacobian.transpose() * jacobian;
-    gradient += jacobian.transpose() * residual;
-    cost += residual.squaredNorm();
-  }
-
-  bool determines(bool with_scale) const {
-    return with_scale ? is_determined<7>(information)
-                      : is_determined<6>(information.topLeftCorner<6, 6>());
-  }
-
-  std::optional<Vector7d> solve(double damping, bool with_scale) const {
-    Matrix7d damped = information;
-    damped.diagonal() *= 1 + damping;
-    Vector7d step = Vector7d::Zero();
-    if (with_scale) {
-      step = -damped.ldlt().solve(gradient);
-    } else {
-      step.head<6>() = -damped.topLeftCorner<6, 6>().ldlt().solve(gradient.head<6>());
-    }
-    if (!step.allFinite()) return std::nullopt;
-    return step;
-  }
-};
-
-// d (exp(delta) * point) / d delta.
-Rows37d moved_by(const Eigen::Vector3d& point) {
-  Rows37d d;
-  d << Eigen::Matrix3d::Identity(), -hat(point), point;
+// d (exp(step) * point) / d step, the step being translation, rotation and, of a similarity, log
+// scale.
+template <int N>
+Eigen::Matrix<double, 3, N> moved_by(const Eigen::Vector3d& point) {
+  Eigen::Matrix<double, 3, N> d;
+  d.template leftCols<3>().setIdentity();
+  d.template middleCols<3>(3) = -hat(point);
+  if constexpr (N == 7) d.col(6) = point;
   return d;
 }
 
-SimilarityEquations linearize(Pairs pairs, const std::vector<char>& inlier, const Sim3d& a_from_b) {
-  SimilarityEquations equations;
+template <int N>
+Sim3d moved(const Eigen::Matrix<double, N, 1>& step, const Sim3d& a_from_b) {
+  Vector7d tangent = Vector7d::Zero();
+  tangent.head<N>() = step;
+  return sim3_exp(tangent) * a_from_b;
+}
+
+// Adds a direction's residual; the point moves with the unknowns by d_point.
+template <int N>
+void add_direction(const BearingObservation& seen, const Eigen::Vector3d& point,
+                   const Eigen::Matrix<double, 3, N>& d_point, NormalEquations<N>* equations) {
+  const std::optional<DirectionResidual> at = direction_residual(seen, point);
+  if (at) equations->template add<2>(at->d_point * d_point, at->residual, 1);
+  equations->cost += at ? at->residual.squaredNorm() : seen.whitening.squaredNorm();
+}
+
+template <int N>
+NormalEquations<N> linearize(Pairs pairs, const std::vector<char>& inlier, const Sim3d& a_from_b) {
+  NormalEquations<N> equations;
   const Sim3d b_from_a = inverse(a_from_b);
   const Eigen::Matrix3d turn = b_from_a.scale() * b_from_a.rotation().toRotationMatrix();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (!inlier[i]) continue;
     const Eigen::Vector3d b_in_a = a_from_b * pairs[i].in_b.point_in_world;
     const Eigen::Vector3d& a_in_a = pairs[i].in_a.point_in_world;
-    equations.add(pairs[i].in_a, b_in_a, moved_by(b_in_a));
-    equations.add(pairs[i].in_b, b_from_a * a_in_a, -turn * moved_by(a_in_a));
+    add_direction<N>(pairs[i].in_a, b_in_a, moved_by<N>(b_in_a), &equations);
+    add_direction<N>(pairs[i].in_b, b_from_a * a_in_a, -turn * moved_by<N>(a_in_a), &equations);
   }
   return equations;
 }
 
-// Minimises the sum over the inliers. None where they leave it open.
-std::optional<Sim3d> minimize(Pairs pairs, const std::vector<char>& inlier, Sim3d a_from_b,
-                              bool with_scale) {
-  constexpr int kIterations = 20;
-  constexpr double kConverged = 1e-8;
-  constexpr double kFirstDamping = 1e-3;
-  constexpr double kMaxDamping = 1e6;
-  SimilarityEquations here = linearize(pairs, inlier, a_from_b);
-  double damping = 0;
-  for (int i = 0; i < kIterations && damping < kMaxDamping; ++i) {
-    const std::optional<Vector7d> step = here.solve(damping, with_scale);
-    if (!step) return std::nullopt;
-    const Sim3d trial = sim3_exp(*step) * a_from_b;
-    SimilarityEquations there = linearize(pairs, inlier, trial);
-    if (there.cost <= here.cost * (1 + 1e-12)) {
-      a_from_b = trial;
-      here = there;
-      if (step->norm() < kConverged) break;
-      damping = damping > kFirstDamping ? damping / 10 : 0;
-    } else {
-      damping = damping > 0 ? damping * 10 : kFirstDamping;
-    }
-  }
-  if (!std::isfinite(here.cost) || !here.determines(with_scale)) return std::nullopt;
-  return a_from_b;
+// Minimises the sum over the inliers in N unknowns: six of a rigid motion, seven of a similarity.
+// None where they leave it open.
+template <int N>
+std::optional<Sim3d> minimize(Pairs pairs, const std::vector<char>& inlier, const Sim3d& a_from_b) {
+  constexpr GaussNewtonStop kStop{20, 1e-8};
+  const auto minimum = damped_gauss_newton<N>(
+      a_from_b, [&](const Sim3d& pose) { return linearize<N>(pairs, inlier, pose); }, moved<N>,
+      kStop);
+  if (!minimum || !is_determined<N>(minimum->equations.full_information())) return std::nullopt;
+  return minimum->state;
 }
 
 std::optional<Sim3d> align(Pairs pairs, const std::array<int, 3>& sample, bool with_scale) {
@@ -190,7 +149,9 @@ std::optional<RelativePose> refine_relative_pose(Pairs pairs, const Sim3d& initi
   Consensus now = consensus_at(pairs, initial_a_from_b, 4 * options.chi2);
   for (int round = 0; round < options.refinement_rounds; ++round) {
     if (now.pose.inliers < std::max(3, options.min_inliers)) return std::nullopt;
-    const auto refined = minimize(pairs, now.pose.inlier, now.pose.a_from_b, options.with_scale);
+    const auto refined = options.with_scale
+                             ? minimize<7>(pairs, now.pose.inlier, now.pose.a_from_b)
+                             : minimize<6>(pairs, now.pose.inlier, now.pose.a_from_b);
     if (!refined) return std::nullopt;
     Consensus next = consensus_at(pairs, *refined, options.chi2);
     const bool settled = next.pose.inlier == now.pose.inlier;
