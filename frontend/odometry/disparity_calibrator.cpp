@@ -9,7 +9,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "frontend/pose/normal_equations.h"
+#include "frontend/pose/damped_gauss_newton.h"
 
 namespace hybrid_slam {
 namespace {
@@ -42,67 +42,86 @@ class TwoFramePoint {
         measured_{before, now},
         weight_{1 / (sigma_before * sigma_before), 1 / (sigma_now * sigma_now)} {}
 
-  std::optional<Contribution> eliminate() {
+  // None if no point is seen by both, or its residuals leave it open.
+  std::optional<Contribution> eliminate() const {
+    // Steps are in units of the depth, so that they are angles and shares.
+    constexpr GaussNewtonStop kStop{10, 1e-6};  // a thousandth of a pixel at a focal length of 1000
     const auto start = triangulate_stereo(camera_, measured_[0]);
     if (!start) return std::nullopt;
-    point_ = *start;
-    for (int i = 0; i < kPointIterations; ++i) {
-      if (!linearize()) return std::nullopt;
-      point_ -= point_information_.ldlt().solve(point_gradient_);
-    }
-    if (!linearize()) return std::nullopt;
-    const Eigen::LLT<Eigen::Matrix3d> factor(point_information_);
-    if (factor.info() != Eigen::Success) return std::nullopt;
-    Contribution reduced = all_;
-    reduced.information -= mixed_ * factor.solve(mixed_.transpose());
-    reduced.gradient -= mixed_ * factor.solve(point_gradient_);
-    return reduced;
+    const auto minimum = damped_gauss_newton<3>(
+        *start, [&](const Eigen::Vector3d& point) { return linearize(point, start->z()); },
+        [&](const Eigen::Vector3d& step, const Eigen::Vector3d& point) -> Eigen::Vector3d {
+          return point + start->z() * step;
+        },
+        kStop);
+    return minimum ? eliminate(minimum->state) : std::nullopt;
   }
 
  private:
-  static constexpr int kPointIterations = 3;
+  struct View {
+    Eigen::Vector3d in_cam;
+    Eigen::Vector3d residual;
+    RowMatrix3d d_in_cam;
+    RowMatrix3d d_point;
+  };
 
-  // Residuals and derivatives at the present point; false if a camera does not see it.
-  bool linearize() {
-    all_ = {};
-    mixed_.setZero();
-    point_information_.setZero();
-    point_gradient_.setZero();
-    for (int frame = 0; frame < 2; ++frame) {
-      const Eigen::Vector3d in_cam = frame == 0 ? point_ : motion_ * point_;
-      Eigen::Vector3d predicted;
-      RowMatrix3d d_point;
-      if (!RectifiedStereo::project_with_jacobians(camera_.params.data(), in_cam.data(),
-                                                   predicted.data(), d_point.data(), nullptr)) {
-        return false;
-      }
-      Eigen::Matrix<double, 3, 7> d_unknowns = Eigen::Matrix<double, 3, 7>::Zero();
-      if (frame == 1) d_unknowns.leftCols<6>() = pose_jacobian<3>(d_point, in_cam);
-      d_unknowns(2, 6) = 1;  // u_right without the offset is smaller
-      const Eigen::Matrix3d d_world =
-          frame == 0 ? Eigen::Matrix3d(d_point)
-                     : Eigen::Matrix3d(d_point * motion_.rotation().toRotationMatrix());
-      const Eigen::Vector3d residual = predicted - measured_[frame];
-      const double weight = weight_[frame];
-      all_.information += weight * d_unknowns.transpose() * d_unknowns;
-      all_.gradient += weight * d_unknowns.transpose() * residual;
-      all_.chi2 += weight * residual.squaredNorm();
-      mixed_ += weight * d_unknowns.transpose() * d_world;
-      point_information_ += weight * d_world.transpose() * d_world;
-      point_gradient_ += weight * d_world.transpose() * residual;
+  // None if the camera does not see it.
+  std::optional<View> view(int frame, const Eigen::Vector3d& point) const {
+    View view;
+    view.in_cam = frame == 0 ? point : motion_ * point;
+    Eigen::Vector3d predicted;
+    if (!RectifiedStereo::project_with_jacobians(camera_.params.data(), view.in_cam.data(),
+                                                 predicted.data(), view.d_in_cam.data(), nullptr)) {
+      return std::nullopt;
     }
-    return true;
+    view.residual = predicted - measured_[frame];
+    view.d_point = view.d_in_cam;
+    if (frame == 1) view.d_point *= motion_.rotation().toRotationMatrix();
+    return view;
+  }
+
+  // In the point alone, by steps in this unit.
+  std::optional<NormalEquations<3>> linearize(const Eigen::Vector3d& point, double unit) const {
+    NormalEquations<3> equations;
+    for (int frame = 0; frame < 2; ++frame) {
+      const std::optional<View> seen = view(frame, point);
+      if (!seen) return std::nullopt;
+      equations.add<3>(unit * seen->d_point, seen->residual, weight_[frame]);
+      equations.cost += weight_[frame] * seen->residual.squaredNorm();
+    }
+    return equations;
+  }
+
+  std::optional<Contribution> eliminate(const Eigen::Vector3d& point) const {
+    Contribution all;
+    Matrix73d mixed = Matrix73d::Zero();
+    Eigen::Matrix3d point_information = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d point_gradient = Eigen::Vector3d::Zero();
+    for (int frame = 0; frame < 2; ++frame) {
+      const std::optional<View> seen = view(frame, point);
+      if (!seen) return std::nullopt;
+      Eigen::Matrix<double, 3, 7> d_unknowns = Eigen::Matrix<double, 3, 7>::Zero();
+      if (frame == 1) d_unknowns.leftCols<6>() = pose_jacobian<3>(seen->d_in_cam, seen->in_cam);
+      d_unknowns(2, 6) = 1;  // u_right without the offset is smaller
+      const double weight = weight_[frame];
+      all.information += weight * d_unknowns.transpose() * d_unknowns;
+      all.gradient += weight * d_unknowns.transpose() * seen->residual;
+      all.chi2 += weight * seen->residual.squaredNorm();
+      mixed += weight * d_unknowns.transpose() * seen->d_point;
+      point_information += weight * seen->d_point.transpose() * seen->d_point;
+      point_gradient += weight * seen->d_point.transpose() * seen->residual;
+    }
+    const Eigen::LLT<Eigen::Matrix3d> factor(point_information);
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    all.information -= mixed * factor.solve(mixed.transpose());
+    all.gradient -= mixed * factor.solve(point_gradient);
+    return all;
   }
 
   const Calibrated<RectifiedStereo>& camera_;
   const Rigid3d& motion_;
   Eigen::Vector3d measured_[2];
   double weight_[2];
-  Eigen::Vector3d point_;
-  Contribution all_;
-  Matrix73d mixed_;
-  Eigen::Matrix3d point_information_;
-  Eigen::Vector3d point_gradient_;
 };
 
 double median_chi2(const std::vector<Contribution>& matches) {
