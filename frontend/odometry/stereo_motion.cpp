@@ -157,7 +157,9 @@ class StereoMotionSolver {
     }
     const std::optional<Rigid3d> start = align_rigid(previous, current);
     if (!start) return std::nullopt;
-    return minimize(*start, sample, {options_.max_gauss_newton_iterations, kHypothesisConverged});
+    // Where a full step does not descend, an outlier is among them, hardly ever noise: not damped.
+    return minimize(*start, sample,
+                    {options_.max_gauss_newton_iterations, kHypothesisConverged, 0});
   }
 
   std::optional<Rigid3d> search() {

@@ -17,7 +17,7 @@ struct StereoOdometerOptions {
   int ransac_iterations = 200;
   double inlier_threshold = 2.0;  // [px] over the four coordinates
   int min_inliers = 6;
-  int max_gauss_newton_iterations = 20;  // of a hypothesis; damped where a step does not descend
+  int max_gauss_newton_iterations = 20;  // of a hypothesis
   std::uint64_t seed = 0;
 
   // Empty if the values can be used, else what is wrong.

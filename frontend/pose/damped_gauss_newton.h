@@ -11,6 +11,9 @@ namespace hybrid_slam {
 struct GaussNewtonStop {
   int iterations;    // steps tried, at most; those that are refused count
   double converged;  // length of a step, in the units of the unknowns
+  // Half the digits of a double: such a step is rounding. With 0 nothing is damped, and the first
+  // step that does not descend is the last one tried.
+  double max_damping = 1e8;
 };
 
 template <typename State, int N>
@@ -30,7 +33,7 @@ struct GaussNewtonMinimum {
 // Converged: the full Gauss-Newton step is shorter than stop.converged. It is taken without a look
 // at its cost, for the one after it would be shorter still. A damped step is short because it is
 // damped, so its length says nothing. Not converged: stop.iterations are used up, or no step
-// lowers the cost. The state is then the best one seen.
+// lowers the cost with stop.max_damping. The state is then the best one seen.
 // None if the start has no finite cost. Whether the problem determines its unknowns is another
 // question: is_determined(minimum.equations.full_information()). Allocates nothing.
 template <int N, typename State, typename Linearize, typename Move>
@@ -39,13 +42,12 @@ std::optional<GaussNewtonMinimum<State, N>> damped_gauss_newton(const State& sta
                                                                 const Move& move,
                                                                 const GaussNewtonStop& stop) {
   constexpr double kFirstDamping = 1e-4;  // times ten where a step is refused, a tenth where not
-  constexpr double kMaxDamping = 1e8;     // half the digits of a double: such a step is rounding
   constexpr double kRounding = 1e-12;     // by which the last steps may change the cost
   const std::optional<NormalEquations<N>> at_start = linearize(start);
   if (!at_start || !std::isfinite(at_start->cost)) return std::nullopt;
   GaussNewtonMinimum<State, N> best{start, *at_start};
   double damping = 0;
-  for (int i = 0; i < stop.iterations && damping < kMaxDamping; ++i) {
+  for (int i = 0; i < stop.iterations && damping <= stop.max_damping; ++i) {
     const auto step = best.equations.solve(damping);
     if (step && damping == 0 && step->norm() < stop.converged) {
       best.state = move(*step, best.state);

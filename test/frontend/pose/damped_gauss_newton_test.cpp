@@ -5,6 +5,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "test/support/allocation_watch.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -84,6 +86,23 @@ TEST_CASE("Where Gauss-Newton diverges, damping leads to the minimum", "[pose]")
   REQUIRE(minimum);
   CHECK(minimum->converged);
   CHECK(std::abs(minimum->state) < 1e-12);
+
+  // Without damping the first step is refused, and the start is all there is.
+  const auto refused = damped_gauss_newton<1>(
+      3.0, [](double x) { return std::optional(arctangent(x)); }, plus_one, {50, 1e-9, 0});
+  REQUIRE(refused);
+  CHECK_FALSE(refused->converged);
+  CHECK(refused->state == 3);
+}
+
+TEST_CASE("A minimisation allocates nothing", "[pose]") {
+  const AllocationWatch watch;
+  const auto minimum = damped_gauss_newton<2>(
+      Vector2d(-1.2, 1), [](const Vector2d& x) { return std::optional(valley(x)); }, plus,
+      {200, 1e-10});
+  const std::size_t largest = watch.largest();
+  CHECK(minimum);
+  CHECK(largest == 0);
 }
 
 TEST_CASE("No step that is taken raises the cost", "[pose]") {
