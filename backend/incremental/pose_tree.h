@@ -122,31 +122,55 @@ class PoseTree {
     return {of_all.data() + offset_[variable], size_[variable]};
   }
   bool is_shared(std::uint32_t variable) const { return shared_[variable] != 0; }
-  std::vector<std::int32_t> paths_to_roots(std::span<const std::uint32_t> variables) const;
-  bool has_changed(const Clique& clique, std::uint32_t variable, Eigen::Index row,
-                   double threshold) const;
   Clique& at(std::int32_t i) { return cliques_[static_cast<std::size_t>(i)]; }
   const Clique& at(std::int32_t i) const { return cliques_[static_cast<std::size_t>(i)]; }
+
+  // The tree's shape: pose_tree.cpp.
   std::int32_t make_clique();
   std::vector<std::uint32_t> detach(const std::vector<std::uint32_t>& touched,
                                     std::vector<std::int32_t>& orphans);
   std::vector<std::uint32_t> terms_inside(const std::vector<std::uint32_t>& poses,
                                           const TermSource& terms) const;
+  std::vector<std::uint32_t> own_terms(const Clique& clique, const TermSource& terms) const;
+  std::vector<std::vector<std::uint32_t>> adjacency_of(const std::vector<std::uint32_t>& poses,
+                                                       const std::vector<std::uint32_t>& inside,
+                                                       const std::vector<std::int32_t>& orphans,
+                                                       const TermSource& terms) const;
   std::vector<std::int32_t> build_cliques(const std::vector<std::uint32_t>& poses,
                                           const std::vector<std::uint32_t>& inside,
                                           const std::vector<std::int32_t>& orphans,
                                           const std::vector<std::uint32_t>& newest,
                                           const TermSource& terms);
+  std::vector<std::vector<std::uint32_t>> attach(const std::vector<std::int32_t>& made,
+                                                 const std::vector<std::uint32_t>& inside,
+                                                 const std::vector<std::int32_t>& orphans,
+                                                 const TermSource& terms);
+
+  // Its factors: tree_factorization.cpp.
+  static double factor_cost(Eigen::Index frontals, Eigen::Index separator);
   void factor(std::int32_t index, const std::vector<std::uint32_t>& own, const TermSource& terms);
-  std::vector<std::uint32_t> own_terms(const Clique& clique, const TermSource& terms) const;
+  Front assemble(const Clique& clique, const std::vector<std::uint32_t>& own,
+                 const TermSource& terms);
+  void add_contribution(const Clique& child, Front& front) const;
+  void damp(const Clique& clique, Front& front) const;
+  void eliminate_frontals(Clique& clique, Front& front);
+  void factor_frontals(Clique& clique, Front& front);
+  std::size_t factor_held(Clique& clique, Front& front) const;
   void restore_contribution(std::int32_t index, const TermSource& terms);
   void settle(std::int32_t index);
   void forget_contributions(const Clique& clique);
-  void add_contribution(const Clique& child, Front& front) const;
-  void damp(const Clique& clique, Front& front) const;
-  void factor_frontals(Clique& clique, Front& front);
-  std::size_t factor_held(Clique& clique, Front& front) const;
+
+  // Its solution: tree_solution.cpp.
   void solve_clique(Clique& clique, double threshold, std::vector<std::uint32_t>& changed);
+  Eigen::VectorXd right_side(const Clique& clique) const;
+  Eigen::Index solve_shared(const Clique& clique, double threshold, Eigen::VectorXd& right);
+  void take(const Clique& clique, const Eigen::VectorXd& solved, double threshold,
+            std::vector<std::uint32_t>& changed);
+  bool has_changed(const Clique& clique, std::uint32_t variable, Eigen::Index row,
+                   double threshold) const;
+
+  // Covariances: tree_covariance.cpp.
+  std::vector<std::int32_t> paths_to_roots(std::span<const std::uint32_t> variables) const;
 
   Options options_;
   std::vector<Clique> cliques_;
