@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "apps/io/graphs/graph_file.h"
+#include "apps/pose_graph/solve_pose_graph.h"
 #include "backend/incremental/incremental_solver.h"
-#include "backend/problem/solve_pose_graph.h"
 
 namespace hybrid_slam {
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/io/graphs/graph_file.h"
-#include "backend/problem/pose_graph_start.h"
+#include "apps/pose_graph/pose_graph_start.h"
 #include "backend/problem/solve_graph.h"
 
 int main(int argc, char** argv) {

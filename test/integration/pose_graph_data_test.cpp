@@ -4,7 +4,7 @@
 #include <string>
 
 #include "apps/io/graphs/g2o.h"
-#include "backend/problem/solve_pose_graph.h"
+#include "apps/pose_graph/solve_pose_graph.h"
 
 #include <catch2/catch.hpp>
 

@@ -5,7 +5,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "backend/problem/pose_graph_structure.h"
+#include "apps/pose_graph/pose_graph_structure.h"
 #include "factors/relative_pose_factor.h"
 
 namespace hybrid_slam {

@@ -1,4 +1,4 @@
-#include "backend/problem/edge_laplacian.h"
+#include "apps/pose_graph/edge_laplacian.h"
 
 namespace hybrid_slam {
 

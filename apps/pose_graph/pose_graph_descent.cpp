@@ -1,4 +1,4 @@
-#include "backend/problem/pose_graph_descent.h"
+#include "apps/pose_graph/pose_graph_descent.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "backend/problem/pose_graph_start.h"
+#include "apps/pose_graph/pose_graph_start.h"
 
 #include <limits>
 #include <queue>
@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
-#include "backend/problem/edge_laplacian.h"
+#include "apps/pose_graph/edge_laplacian.h"
 
 namespace hybrid_slam {
 

@@ -1,4 +1,4 @@
-#include "backend/problem/pose_graph_start.h"
+#include "apps/pose_graph/pose_graph_start.h"
 
 #include "cameras/geometry/se3.h"
 #include "test/support/pose_graphs.h"

@@ -1,6 +1,6 @@
-#include "backend/problem/solve_pose_graph.h"
+#include "apps/pose_graph/solve_pose_graph.h"
 
-#include "backend/problem/pose_graph_descent.h"
+#include "apps/pose_graph/pose_graph_descent.h"
 #include "cameras/geometry/se3.h"
 #include "test/support/pose_graphs.h"
 

@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "apps/pose_graph/pose_graph_structure.h"
 #include "backend/problem/factor_graph.h"
-#include "backend/problem/pose_graph_structure.h"
 
 namespace hybrid_slam {
 

@@ -1,4 +1,4 @@
-#include "backend/problem/pose_graph_structure.h"
+#include "apps/pose_graph/pose_graph_structure.h"
 
 namespace hybrid_slam {
 

@@ -1,10 +1,10 @@
-#include "backend/problem/solve_pose_graph.h"
+#include "apps/pose_graph/solve_pose_graph.h"
 
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
-#include "backend/problem/pose_graph_descent.h"
+#include "apps/pose_graph/pose_graph_descent.h"
 
 namespace hybrid_slam {
 

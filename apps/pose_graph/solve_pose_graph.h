@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "backend/problem/pose_graph_start.h"
+#include "apps/pose_graph/pose_graph_start.h"
 #include "backend/problem/solve_graph.h"
 
 namespace hybrid_slam {

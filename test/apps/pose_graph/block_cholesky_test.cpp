@@ -1,4 +1,4 @@
-#include "backend/problem/block_cholesky.h"
+#include "apps/pose_graph/block_cholesky.h"
 
 #include <Eigen/Cholesky>
 
