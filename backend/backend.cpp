@@ -106,7 +106,9 @@ BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
   if (options_.local_method == LocalMethod::kBundle) {
     return take_in(solve_bundle(view(), make_local_bundle(view(), newest, options_.local), stop));
   }
-  return take_in(smoother().update(snapshot(), newest, stop));
+  const BundleSummary summary = take_in(smoother().update(snapshot(), newest, stop));
+  map_.set_covariances(smoother_->covariances(view()));
+  return summary;
 }
 
 // The oldest.

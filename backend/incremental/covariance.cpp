@@ -75,6 +75,24 @@ IncrementalSolver::Dependence IncrementalSolver::dependence_of(const GraphVariab
   return result;
 }
 
+IncrementalSolver::PosePaths IncrementalSolver::paths(const std::vector<std::uint32_t>& poses,
+                                                      std::size_t most) const {
+  std::vector<std::uint32_t> wanted;
+  for (const std::uint32_t pose : poses) wanted.push_back(poses_.at(pose).variable);
+  PosePaths result;
+  result.paths = tree_.paths(wanted, most);
+  for (std::uint32_t at = 0; at < result.paths.variables.size(); ++at) {
+    const std::uint32_t variable = result.paths.variables[at];
+    if (variables_[variable].is_block) continue;
+    const Matrix6d identity = Matrix6d::Identity();
+    result.poses.push_back({variables_[variable].index, at,
+                            pose_with(variable).tangent.from_left(identity, pose_at(variable))});
+  }
+  std::sort(result.poses.begin(), result.poses.end(),
+            [](const auto& a, const auto& b) { return a.pose < b.pose; });
+  return result;
+}
+
 Matrix6d IncrementalSolver::covariance(std::uint32_t pose) const {
   return covariance({pose_variable(pose)});
 }

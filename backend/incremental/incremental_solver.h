@@ -128,6 +128,19 @@ class IncrementalSolver final : private TermSource {
   // these variables to the root, of a point from all that see it.
   Eigen::MatrixXd covariance(const std::vector<GraphVariable>& variables) const;
 
+  // For covariances of these poses, and of others that come with them, without the solver: of those
+  // in `poses`, ascending by pose, that vary and have terms. `most`: see PoseTree::paths.
+  struct PosePaths {
+    struct Known {
+      std::uint32_t pose = 0;
+      std::uint32_t at = 0;  // its place in the paths' variables
+      Matrix6d by_variable;  // derivative of its left perturbation
+    };
+    CholeskyPaths paths;
+    std::vector<Known> poses;
+  };
+  PosePaths paths(const std::vector<std::uint32_t>& poses, std::size_t most) const;
+
   // Takes in what was added and removed since the last update. Looks at `stop` between steps, so
   // that every update makes one; what was left to do then waits for the next update.
   UpdateSummary update(const std::stop_token& stop = {});

@@ -48,6 +48,11 @@ class MapSmoother {
   BundleResult update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
                       const std::stop_token& stop = {});
 
+  // How certain the keyframes are, as of the last update: of the map's newest one of each camera,
+  // then of those that share most landmarks with these, and of those that come with them, up to a
+  // bounded cost. Those that a window has marginalised are not known.
+  std::shared_ptr<const KeyframeCovariances> covariances(const MapSnapshot& map) const;
+
   const IncrementalSolver& solver() const { return solver_; }
 
  private:

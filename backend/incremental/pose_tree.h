@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "backend/incremental/front.h"
+#include "backend/map/keyframe_covariances.h"
 
 namespace hybrid_slam {
 
@@ -82,6 +83,11 @@ class PoseTree {
   // system has zeros.
   Eigen::MatrixXd covariance(std::span<const std::uint32_t> variables) const;
 
+  // The cliques of these variables and all above them, as they are now. Once they have `most`
+  // numbers no further variable's are taken; the first one's are always. What is not part of the
+  // system has none.
+  CholeskyPaths paths(std::span<const std::uint32_t> variables, std::size_t most) const;
+
   // By clique: how many are above it.
   std::vector<std::int32_t> depths() const;
   // The clique that eliminates the first of these variables, all of one term; none: negative.
@@ -97,6 +103,7 @@ class PoseTree {
 
  private:
   static constexpr std::int32_t kNone = -1;
+  static constexpr std::size_t kAll = static_cast<std::size_t>(-1);
 
   struct Clique {
     std::vector<std::uint32_t> frontals;
@@ -170,7 +177,8 @@ class PoseTree {
                    double threshold) const;
 
   // Covariances: tree_covariance.cpp.
-  std::vector<std::int32_t> paths_to_roots(std::span<const std::uint32_t> variables) const;
+  std::vector<std::int32_t> paths_to_roots(std::span<const std::uint32_t> variables,
+                                           std::size_t most = kAll) const;
 
   Options options_;
   std::vector<Clique> cliques_;

@@ -41,10 +41,14 @@ class KeptRows {
 
 }  // namespace
 
-// The cliques of these variables and all above, those below before those above.
-std::vector<std::int32_t> PoseTree::paths_to_roots(std::span<const std::uint32_t> variables) const {
+// The cliques of these variables and all above, those below before those above. Stops once they
+// have `most` numbers.
+std::vector<std::int32_t> PoseTree::paths_to_roots(std::span<const std::uint32_t> variables,
+                                                   std::size_t most) const {
   std::map<std::int32_t, std::size_t> depth;  // by clique: how far from its root
+  std::size_t numbers = 0;
   for (const std::uint32_t variable : variables) {
+    if (numbers >= most) break;
     std::vector<std::int32_t> path;
     for (std::int32_t i = clique_of_[variable]; i != kNone && !depth.contains(i);
          i = at(i).parent) {
@@ -53,6 +57,7 @@ std::vector<std::int32_t> PoseTree::paths_to_roots(std::span<const std::uint32_t
     for (std::size_t k = path.size(); k-- > 0;) {
       const std::int32_t parent = at(path[k]).parent;
       depth[path[k]] = parent == kNone ? 0 : depth.at(parent) + 1;
+      numbers += static_cast<std::size_t>(at(path[k]).factor.size());
     }
   }
   std::vector<std::int32_t> cliques;
@@ -101,6 +106,34 @@ Eigen::MatrixXd PoseTree::covariance(std::span<const std::uint32_t> variables) c
     columns.scatter(clique.frontals, right);
   }
   return columns.gather(wanted, count);
+}
+
+CholeskyPaths PoseTree::paths(std::span<const std::uint32_t> variables, std::size_t most) const {
+  const std::vector<std::int32_t> cliques = paths_to_roots(variables, most);
+  CholeskyPaths result;
+  for (const std::int32_t i : cliques) {
+    result.variables.insert(result.variables.end(), at(i).frontals.begin(), at(i).frontals.end());
+  }
+  std::sort(result.variables.begin(), result.variables.end());
+  for (const std::uint32_t variable : result.variables) {
+    result.offsets.push_back(result.rows() + size(variable));
+  }
+  const auto places = [&](const std::vector<std::uint32_t>& of) {
+    std::vector<std::uint32_t> found;
+    for (const std::uint32_t variable : of) {
+      const auto place =
+          std::lower_bound(result.variables.begin(), result.variables.end(), variable);
+      found.push_back(static_cast<std::uint32_t>(place - result.variables.begin()));
+    }
+    return found;
+  };
+  for (const std::int32_t i : cliques) {
+    const Clique& clique = at(i);
+    result.cliques.push_back(
+        {places(clique.frontals), places(clique.separator),
+         clique.factor.topRows(clique.factor.cols() + clique.separator_rows())});
+  }
+  return result;
 }
 
 }  // namespace hybrid_slam

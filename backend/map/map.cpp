@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "backend/map/dropped_features.h"
 #include "backend/map/landmark_attributes.h"
@@ -162,6 +163,10 @@ void Map::set_camera(CameraId id, const Camera& camera) {
 void Map::set_keep(KeyframeId id) {
   auto& keyframes = view_.tables_.keyframes;
   if (keyframes.find(id.value) != nullptr) keyframes.edit(id.value).keep = true;
+}
+
+void Map::set_covariances(std::shared_ptr<const KeyframeCovariances> covariances) {
+  view_.tables_.covariances = std::move(covariances);
 }
 
 std::vector<std::uint32_t> Map::drop_features(KeyframeId id) {

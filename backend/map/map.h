@@ -31,6 +31,9 @@ class Map {
   void set_camera(CameraId id, const Camera& camera);  // refined intrinsics
   void set_keep(KeyframeId id);                        // exempt from culling
 
+  // What an optimiser knows of how certain the poses are; null: nothing.
+  void set_covariances(std::shared_ptr<const KeyframeCovariances> covariances);
+
   // Drops the features of a keyframe that have neither a landmark nor a right match. The others
   // keep their order and get new indices, wherever the map names them. Returns their old ones,
   // ascending; nothing was done, and the indices hold, if that is all of them. Empty for a keyframe

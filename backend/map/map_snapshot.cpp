@@ -99,6 +99,11 @@ Rigid3d MapSnapshot::cam_from_world(KeyframeId id) const {
   return cam_from_ancestor * at(id).cam_from_world;
 }
 
+std::optional<Matrix6d> MapSnapshot::keyframe_covariance(KeyframeId id) const {
+  if (covariances() == nullptr || !covariances()->knows(id)) return std::nullopt;
+  return covariances()->covariance(id);
+}
+
 std::vector<Covisible> MapSnapshot::covisible(KeyframeId id, int min_shared,
                                               std::size_t limit) const {
   std::vector<Covisible> found;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -54,6 +55,16 @@ class MapSnapshot {
 
   // Pose of a keyframe that is or was in the map, through the spanning tree if it was erased.
   Rigid3d cam_from_world(KeyframeId id) const;
+
+  // How certain the poses of keyframes around the newest ones are, of each camera, as the
+  // incremental smoother found in its last update: null before the first one (a map that was
+  // loaded) and where another method optimises. What changed the map since (full bundle adjustment,
+  // a loop until it is smoothed) is not in it.
+  const KeyframeCovariances* covariances() const { return tables_.covariances.get(); }
+
+  // The covariance of a keyframe's left perturbation against the origin (docs/conventions.md); none
+  // where it is not known.
+  std::optional<Matrix6d> keyframe_covariance(KeyframeId id) const;
 
   // Covisible keyframes with at least `min_shared` landmarks in common, most first (ties: lower
   // id), at most `limit`.

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "backend/map/ids.h"
 #include "backend/map/keyframe.h"
+#include "backend/map/keyframe_covariances.h"
 #include "backend/map/landmark.h"
 #include "backend/map/persistent_table.h"
 #include "cameras/camera.h"
@@ -28,11 +30,12 @@ struct MapTables {
   std::uint32_t next_keyframe = 0;
   std::uint32_t next_landmark = 0;
   std::vector<std::int64_t> newest_frame_index;  // per camera, of any keyframe ever added; or -1
+  std::shared_ptr<const KeyframeCovariances> covariances;  // null where nobody told; not saved
 
   // A complete copy that costs next to nothing; see PersistentTable::share().
   MapTables share() {
-    return {cameras, keyframes.share(), landmarks.share(), erased.share(),
-            origin,  next_keyframe,     next_landmark,     newest_frame_index};
+    return {cameras,       keyframes.share(), landmarks.share(),  erased.share(), origin,
+            next_keyframe, next_landmark,     newest_frame_index, covariances};
   }
 };
 

@@ -4,6 +4,7 @@
 
 #include "cameras/geometry/se3.h"
 #include "cameras/geometry/sim3d.h"
+#include "cameras/geometry/uncertain_motion.h"
 #include "test/support/jacobian_check.h"
 #include "test/support/random.h"
 
@@ -143,6 +144,32 @@ TEST_CASE("Left Jacobians against numeric differences, from zero to pi") {
                             numeric_jacobian(se3_step, Vector6d::Zero())) < 1e-10);
     CHECK((se3_left_jacobian(tangent) * se3_left_jacobian_inverse(tangent) - Matrix6d::Identity())
               .norm() < 1e-12);
+  }
+}
+
+// Against the poses themselves, a step along each of the six axes.
+TEST_CASE("Covariances of motions are those of the inverse, and those that ROS has") {
+  Random random(11);
+  constexpr double kStep = 1e-6;
+  for (int i = 0; i < 20; ++i) {
+    const Rigid3d b_from_a = random.rigid(3, kPi);
+    const Rigid3d a_from_b = inverse(b_from_a);
+    Matrix6d by_inverse, in_ros;
+    for (int k = 0; k < 6; ++k) {
+      const Rigid3d moved = se3_exp(kStep * Vector6d::Unit(k)) * b_from_a;
+      by_inverse.col(k) = se3_log(inverse(moved) * b_from_a) / kStep;
+      in_ros.col(k) << moved.translation() - b_from_a.translation(),
+          so3_log(moved.rotation() * b_from_a.rotation().conjugate());
+      in_ros.col(k) /= kStep;
+    }
+    Matrix6d root;
+    for (double& x : root.reshaped()) x = random.uniform(-1, 1);
+    const UncertainMotion motion{b_from_a, root * root.transpose()};
+    CHECK(inverse(motion).b_from_a.params == a_from_b.params);
+    CHECK((inverse(motion).covariance - by_inverse * motion.covariance * by_inverse.transpose())
+              .norm() < 1e-3);
+    CHECK((ros_covariance(motion) - in_ros * motion.covariance * in_ros.transpose()).norm() < 1e-3);
+    CHECK(ros_covariance(motion) == ros_covariance(motion).transpose());
   }
 }
 

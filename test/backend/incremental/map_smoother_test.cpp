@@ -239,6 +239,60 @@ TEST_CASE("A map grown with the smoother is as good as after bundle adjustment o
   CHECK(adjusted < 0.05);
 }
 
+// What is handed out is enough to have any covariance without the solver, as the solver has it.
+TEST_CASE("The covariances that a smoother hands out are those of its solver") {
+  SyntheticSceneOptions scene;
+  scene.times = 25;
+  scene.landmarks = 800;
+  Backend backend{BackendOptions()};
+  grow(make_synthetic_scene(scene), backend, 0.01);
+  const auto map = backend.snapshot();
+  const std::vector<KeyframeId> ids = map->keyframe_ids();
+  MapSmoother smoother{MapSmootherOptions()};
+  smoother.update(map, ids.back());
+  const auto handed_out = smoother.covariances(*map);
+  int compared = 0;
+  for (std::uint32_t i = 0; i < ids.size(); ++i) {
+    if (!handed_out->knows(ids[i])) continue;
+    const Matrix6d expected = smoother.solver().covariance(i);
+    CHECK((handed_out->covariance(ids[i]) - expected).norm() <= 1e-9 * expected.norm());
+    ++compared;
+  }
+  CHECK(compared >= 5);
+  REQUIRE(handed_out->knows(ids.back()));
+
+  // Of a difference: what both have in common is in it.
+  const auto last = static_cast<std::uint32_t>(ids.size() - 1);
+  const GraphVariable newest{GraphVariable::Kind::kPose, last};
+  const GraphVariable before{GraphVariable::Kind::kPose, last - 1};
+  const Eigen::MatrixXd both = smoother.solver().covariance({newest, before});
+  Eigen::Matrix<double, 6, 12> difference;
+  difference << Matrix6d::Identity(), -2 * Matrix6d::Identity();
+  const Matrix6d expected = difference * both * difference.transpose();
+  const std::vector<KeyframeCovariances::Derivative> derivatives = {
+      {ids[last], Matrix6d::Identity()}, {ids[last - 1], -2 * Matrix6d::Identity()}};
+  CHECK((handed_out->covariance(derivatives) - expected).norm() <= 1e-9 * expected.norm());
+}
+
+TEST_CASE("Snapshots tell how certain the newest keyframe is, where a smoother knows it") {
+  SyntheticSceneOptions scene;
+  scene.times = 25;
+  scene.landmarks = 800;
+  for (const LocalMethod method : {LocalMethod::kIncremental, LocalMethod::kBundle}) {
+    BackendOptions options;
+    options.local_method = method;
+    Backend backend(options);
+    CHECK_FALSE(backend.view().keyframe_covariance(KeyframeId(0)));
+    grow(make_synthetic_scene(scene), backend, 0.01);
+    const auto map = backend.snapshot();
+    const auto newest = map->keyframe_covariance(map->keyframe_ids().back());
+    CHECK(newest.has_value() == (method == LocalMethod::kIncremental));
+    if (!newest) continue;
+    CHECK(Eigen::LLT<Matrix6d>(*newest).info() == Eigen::Success);
+    CHECK(map->keyframe_covariance(map->origin()) == Matrix6d(Matrix6d::Zero()));
+  }
+}
+
 TEST_CASE("A smoother with a window goes on where keyframes were marginalised") {
   SyntheticSceneOptions scene;
   scene.times = 40;
