@@ -184,6 +184,14 @@ class PoseRefiner {
 
 }  // namespace
 
+double inlier_efficiency(int dimension, double chi2) {
+  const double half = 0.5 * chi2;
+  const double tail = std::exp(-half);
+  if (dimension == 2) return 1 - half * tail / (1 - tail);
+  const double cut = std::sqrt(half) * tail / std::tgamma(1.5);  // P_3 = P_1 - this
+  return 1 - half * cut / (1.5 * (std::erf(std::sqrt(half)) - cut));
+}
+
 PoseRefinementResult refine_pose(const Camera& camera, const Rigid3d& initial_cam_from_world,
                                  std::span<const PoseObservation> observations,
                                  const PoseRefinementOptions& options) {

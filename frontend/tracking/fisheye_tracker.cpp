@@ -51,7 +51,8 @@ FisheyeTracker::FisheyeTracker(CameraId camera_id, const Calibrated<KannalaBrand
                                const FisheyeTrackerOptions& options,
                                std::shared_ptr<const KeyframeDatabase> places)
     : camera_id_(camera_id),
-      focal_(focal_length(Camera(camera))),
+      camera_(camera),
+      focal_(focal_length(camera_)),
       options_(options),
       matcher_(camera_id, camera, options, std::move(places)),
       last_(camera_id) {
@@ -64,6 +65,7 @@ FisheyeTracker::FisheyeTracker(CameraId camera_id, const Calibrated<KannalaBrand
 TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, KeyframeId stereo_reference,
                                    bool allow_keyframe) {
   last_.follow(map);
+  uncertain_.reset();
   bool certain = false;
   TrackedFrame result;
   result.frame_index = frame.index;
@@ -80,6 +82,9 @@ TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, Keyframe
       result.inliers = match->inliers;
       certain = is_certain(map, frame, match->information);
       result.counts = std::move(match->counts);
+      uncertain_ = hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
+                                               options_.pose);
+      write_covariance(map, *uncertain_, result);
     }
   }
   if (result.tracked() && allow_keyframe && !last_.waits_for_keyframe() && certain &&

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "backend/map/map_snapshot.h"
@@ -8,6 +9,7 @@
 #include "frontend/tracking/last_frame.h"
 #include "frontend/tracking/map_matcher.h"
 #include "frontend/tracking/tracked_frame.h"
+#include "frontend/tracking/uncertain_pose.h"
 
 namespace hybrid_slam {
 
@@ -37,16 +39,21 @@ class FisheyeTracker {
   TrackedFrame track(Frame frame, const MapSnapshot& map, KeyframeId stereo_reference,
                      bool allow_keyframe = true);
 
+  // What the last frame's pose is off by, for relative_pose(); null if it was lost.
+  const UncertainPose* uncertain_pose() const { return uncertain_ ? &*uncertain_ : nullptr; }
+
  private:
   std::vector<KeyframeId> candidates(const MapSnapshot& map, KeyframeId stereo_reference) const;
   bool is_certain(const MapSnapshot& map, const Frame& frame, const Matrix6d& information) const;
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
 
   CameraId camera_id_;
+  Camera camera_;
   double focal_;  // [px]
   FisheyeTrackerOptions options_;
   MapMatcher matcher_;
   LastFrame last_;
+  std::optional<UncertainPose> uncertain_;  // the last frame
 };
 
 }  // namespace hybrid_slam

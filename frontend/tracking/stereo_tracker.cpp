@@ -77,9 +77,11 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
 TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allow_keyframe) {
   if (!map.origin().valid()) {
     TrackedFrame result = initialize(frame, map);
+    uncertain_ = UncertainPose::of_keyframe(camera_id_, frame.index, KeyframeId());
     return remember(map, std::move(frame), std::move(result));
   }
   last_.follow(map);
+  if (uncertain_) uncertain_ = present(map, *uncertain_);
   correct_disparities(frame);
   TrackedFrame result;
   result.frame_index = frame.index;
@@ -102,24 +104,34 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
     chain_.add(believed ? motion : std::nullopt);
     if (information) {
       result.source = PoseSource::kLocalMap;
+      std::vector<PoseObservation> others;
       if (motion && result.inliers < kFewLandmarks * result.odometer_inliers) {
-        result.inliers = matcher_.refine(map, frame, points_of_last_frame(*motion, frame));
+        others = points_of_last_frame(*motion, frame);
+        result.inliers = matcher_.refine(map, frame, others);
         result.counts.found = valid_ids(frame.landmarks);
       }
+      uncertain_ =
+          hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
+                                      options_.pose, others, uncertain_ ? &*uncertain_ : nullptr);
     } else if (result.odometer_inliers >= options_.min_odometer_inliers) {
       frame.cam_from_world = predicted;
       matcher_.keep_agreeing(map, frame);
       result.reference = last_.reference();
       result.source = PoseSource::kOdometer;
+      uncertain_ =
+          moved(*uncertain_, {motion->current_from_previous, motion->covariance}, frame.index);
     }
   } else if (matcher_.relocalize(map, {}, frame) &&
              track_local_map(frame, map, options_.relocalization.min_inliers, result)) {
     result.source = PoseSource::kRelocalization;
+    uncertain_ = hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
+                                             options_.pose);
   }
   if (result.tracked()) {
     result.cam_from_world = frame.cam_from_world;
     result.cam_from_reference =
         frame.cam_from_world * inverse(map.cam_from_world(result.reference));
+    write_covariance(map, *uncertain_, result);
     if (allow_keyframe && !last_.waits_for_keyframe() && wants_keyframe(frame, map, result)) {
       result.keyframe = make_keyframe(frame, map, result.reference);
     }
@@ -280,6 +292,7 @@ int StereoTracker::share_of_features(const Frame& frame, double share) const {
 
 TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, TrackedFrame result) {
   if (!last_.tracked()) chain_.add(std::nullopt);
+  if (!result.tracked()) uncertain_.reset();
   if (result.tracked()) matcher_.learn_shading(map, frame);
   if (result.keyframe) {
     chain_.begin();

@@ -13,6 +13,7 @@
 #include "frontend/tracking/last_frame.h"
 #include "frontend/tracking/map_matcher.h"
 #include "frontend/tracking/tracked_frame.h"
+#include "frontend/tracking/uncertain_pose.h"
 
 namespace hybrid_slam {
 
@@ -46,6 +47,9 @@ class StereoTracker {
   // `allow_keyframe`: false while mapping has more waiting than it can take.
   TrackedFrame track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);
 
+  // What the last frame's pose is off by, for relative_pose(); null if it was lost.
+  const UncertainPose* uncertain_pose() const { return uncertain_ ? &*uncertain_ : nullptr; }
+
  private:
   TrackedFrame initialize(Frame& frame, const MapSnapshot& map) const;
   void correct_disparities(Frame& frame) const;
@@ -70,6 +74,7 @@ class StereoTracker {
   DisparityCalibrator disparity_;
   MapMatcher matcher_;
   LastFrame last_;
+  std::optional<UncertainPose> uncertain_;  // the last frame
 };
 
 }  // namespace hybrid_slam

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "backend/map/map_edit.h"
-#include "cameras/geometry/rigid3d.h"
+#include "cameras/geometry/uncertain_motion.h"
 
 namespace hybrid_slam {
 
@@ -29,9 +29,19 @@ struct TrackedFrame {
   double time = 0;  // [s]
   PoseSource source = PoseSource::kNone;
   Prediction prediction = Prediction::kNone;
-  Rigid3d cam_from_world;       // as known at this moment
-  KeyframeId reference;         // invalid for the frame that starts the map
-  Rigid3d cam_from_reference;   // through which the frame follows later corrections
+  Rigid3d cam_from_world;      // as known at this moment
+  KeyframeId reference;        // invalid for the frame that starts the map
+  Rigid3d cam_from_reference;  // through which the frame follows later corrections
+  // How far off the pose may be: of its left perturbation d, exp(d) * cam_from_world, d =
+  // (translation, rotation) [m, rad] along the camera's axes. It has the frame's own noise, what
+  // its landmarks are off by and what the keyframes are that see these (frontend/tracking/
+  // uncertain_pose.h). ros_covariance(inverse({cam_from_world, covariance})) is what ROS calls the
+  // covariance of this pose.
+  Matrix6d covariance = Matrix6d::Zero();
+  // The keyframe against which: the map's origin, or, where the map does not know how certain it is
+  // here (MapSnapshot::covariances), the one that shares most landmarks with the frame. Invalid of
+  // a frame that is lost, and of the one that starts the map, which is exact.
+  KeyframeId covariance_base;
   double disparity_offset = 0;  // [px] found in the rectification and removed
   double shading = 0;           // that moving lamps pretend, removed; see ShadingCalibrator
   int odometer_inliers = 0;

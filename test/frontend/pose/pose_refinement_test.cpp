@@ -211,6 +211,23 @@ TEST_CASE("pose refinement's information is the inverse of the scatter", "[pose]
   CHECK((whitened - Matrix6d::Identity()).cwiseAbs().maxCoeff() < 0.15);
 }
 
+// The efficiency is the mean square of what is kept, which is what Stein's identity says.
+TEST_CASE("what a test of outliers leaves of the information", "[pose]") {
+  Random random(12);
+  for (const auto& [dimension, chi2] : {std::pair(2, 5.991), {3, 7.815}, {2, 2.0}, {3, 20.0}}) {
+    double sum = 0;
+    int kept = 0;
+    for (int i = 0; i < 200000; ++i) {
+      const Eigen::Vector3d noise = random.gaussian3(1);
+      const double s = noise.head(dimension).squaredNorm();
+      if (s > chi2) continue;
+      sum += s;
+      ++kept;
+    }
+    CHECK(inlier_efficiency(dimension, chi2) == Approx(sum / (dimension * kept)).margin(0.006));
+  }
+}
+
 TEST_CASE("pose refinement returns the initial pose where it cannot do better", "[pose]") {
   const Camera camera = pose_scene::pinhole();
   const Scene scene = make_scene(camera, 50, 0, 0, 4);
