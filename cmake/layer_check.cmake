@@ -4,16 +4,23 @@
 
 cmake_minimum_required(VERSION 3.25)
 
-set(rooms cameras/geometry cameras factors backend/map backend/problem backend/incremental backend frontend apps)
+set(rooms cameras/files cameras/geometry cameras/calibration cameras factors backend/map backend/problem backend/incremental backend
+          frontend/features frontend/matching frontend apps)
+set(allowed_cameras/files "")
 set(allowed_cameras/geometry "")
+set(allowed_cameras/calibration cameras/files cameras cameras/geometry)
 set(allowed_cameras cameras/geometry)
 set(allowed_factors cameras cameras/geometry)
-set(allowed_backend/map cameras cameras/geometry)
+set(allowed_backend/map cameras cameras/geometry cameras/files)
 set(allowed_backend/problem backend/map factors cameras cameras/geometry)
 set(allowed_backend/incremental backend/problem backend/map factors cameras cameras/geometry)
 set(allowed_backend backend/incremental backend/problem backend/map factors cameras cameras/geometry)
-set(allowed_frontend backend/map factors cameras cameras/geometry)
-set(allowed_apps frontend backend backend/incremental backend/problem backend/map factors cameras cameras/geometry)
+set(allowed_frontend/features backend/map)
+set(allowed_frontend/matching frontend/features backend/map cameras cameras/geometry)
+set(allowed_frontend frontend/features frontend/matching backend/map factors cameras cameras/geometry
+    cameras/files cameras/calibration)
+set(allowed_apps frontend frontend/features frontend/matching backend backend/incremental backend/problem backend/map
+    factors cameras cameras/geometry cameras/files cameras/calibration)
 
 function(room_of path out)
   set(best "")

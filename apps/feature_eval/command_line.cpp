@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
+#include "apps/program/program.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -74,17 +76,11 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
     add_options(*command, line);
     command->footer(kFooter);
   }
-  try {
-    app.parse(argc, argv);
-    line.command = match->parsed() ? EvalCommand::kMatch : EvalCommand::kExtract;
-    check(line);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {  // --help
-      exit_code = app.exit(error);
-    } else {
-      spdlog::error("{} (--help tells more)", error.what());
-      exit_code = kExitBadUsage;
-    }
+  if (const auto end = parse_line(app, argc, argv, [&] {
+        line.command = match->parsed() ? EvalCommand::kMatch : EvalCommand::kExtract;
+        check(line);
+      })) {
+    exit_code = *end;
     return std::nullopt;
   }
   return line;

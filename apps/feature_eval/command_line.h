@@ -22,9 +22,6 @@ struct CommandLine {
   std::string json;  // empty: none
 };
 
-// Exit codes of the program, as --help lists them.
-enum ExitCode : int { kExitOk = 0, kExitInternalError = 1, kExitBadUsage = 2, kExitBadInput = 3 };
-
 // Reads the command line. Empty if the program shall end at once with `exit_code` (help, bad usage
 // or an engine that cannot be used, which have been reported).
 std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code);

@@ -9,7 +9,7 @@
 
 #include "apps/feature_eval/pictures.h"
 #include "apps/slam/parallel_for.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 #include "frontend/input/image_file.h"
 
 namespace hybrid_slam {

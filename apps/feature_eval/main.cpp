@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <nlohmann/json.hpp>
@@ -7,8 +6,7 @@
 #include "apps/feature_eval/command_line.h"
 #include "apps/feature_eval/evaluation.h"
 #include "apps/io/report.h"
-#include "cameras/input_error.h"
-#include "cameras/output_file.h"
+#include "apps/program/program.h"
 
 namespace hybrid_slam {
 namespace {
@@ -103,10 +101,12 @@ void print_results(const Json& json) {
   }
 }
 
-int guarded_main(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("feature_eval"));
-  spdlog::set_pattern("%n: %^%l%$: %v");
-  try {
+}  // namespace
+}  // namespace hybrid_slam
+
+int main(int argc, char** argv) {
+  using namespace hybrid_slam;
+  return run_program("feature_eval", [&]() -> int {
     int exit_code = kExitOk;
     const auto line = parse_command_line(argc, argv, exit_code);
     if (!line) return exit_code;
@@ -114,19 +114,5 @@ int guarded_main(int argc, char** argv) {
     print_results(json);
     if (!line->json.empty()) write_json(line->json, json);
     return kExitOk;
-  } catch (const InputError& error) {
-    spdlog::error(error.what());
-    return kExitBadInput;
-  } catch (const OutputError& error) {
-    spdlog::error(error.what());
-    return kExitBadInput;
-  } catch (const std::exception& error) {
-    spdlog::critical("internal error: {}", error.what());
-    return kExitInternalError;
-  }
+  });
 }
-
-}  // namespace
-}  // namespace hybrid_slam
-
-int main(int argc, char** argv) { return hybrid_slam::guarded_main(argc, argv); }

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
+#include "apps/program/program.h"
 #include "apps/slam/parallel_for.h"
 
 namespace hybrid_slam {
@@ -134,25 +135,19 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--map", line.map, "map file (map.hslam) to go on with")->option_text("FILE");
   app.add_flag("--localize", line.localize, "track in the map of --map without changing it");
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
-  try {
-    app.parse(argc, argv);
-    if (line.rate > 0 && line.mode != SessionMode::kRealtime) {
-      throw CLI::ValidationError("--rate needs --mode realtime");
-    }
-    if (line.localize && line.map.empty()) {
-      throw CLI::ValidationError("--localize needs --map");
-    }
-    if (line.localize && line.checkpoint_every > 0) {
-      throw CLI::ValidationError(
-          "--localize changes no map: nothing for --checkpoint-every to save");
-    }
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {  // --help
-      exit_code = app.exit(error);
-    } else {
-      spdlog::error("{} (--help tells more)", error.what());
-      exit_code = kExitBadUsage;
-    }
+  if (const auto end = parse_line(app, argc, argv, [&] {
+        if (line.rate > 0 && line.mode != SessionMode::kRealtime) {
+          throw CLI::ValidationError("--rate needs --mode realtime");
+        }
+        if (line.localize && line.map.empty()) {
+          throw CLI::ValidationError("--localize needs --map");
+        }
+        if (line.localize && line.checkpoint_every > 0) {
+          throw CLI::ValidationError(
+              "--localize changes no map: nothing for --checkpoint-every to save");
+        }
+      })) {
+    exit_code = *end;
     return std::nullopt;
   }
   if (!config.empty()) {

@@ -32,15 +32,8 @@ struct CommandLine {
   SlamOptions options;
 };
 
-// Exit codes of the program, as --help lists them.
-enum ExitCode : int {
-  kExitOk = 0,
-  kExitInternalError = 1,
-  kExitBadUsage = 2,
-  kExitBadInput = 3,
-  kExitNothingTracked = 4,
-  kExitInterrupted = 130
-};
+// Of this program alone, beside ExitCode.
+constexpr int kExitNothingTracked = 4;
 
 // Reads the command line and the configuration file it names. Empty if the program shall end at
 // once with `exit_code` (help, or bad usage, which has been reported). Throws InputError for the

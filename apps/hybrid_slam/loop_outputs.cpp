@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string>
 
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
@@ -8,12 +7,13 @@
 #include "apps/hybrid_slam/command_line.h"
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/io/progress_line.h"
+#include "apps/program/program.h"
 #include "apps/slam/interrupt.h"
 #include "apps/slam/replay.h"
 #include "backend/map/map_file.h"
 #include "backend/problem/solver_log.h"
-#include "cameras/input_error.h"
-#include "cameras/output_file.h"
+#include "cameras/files/input_error.h"
+#include "cameras/files/output_file.h"
 #include "frontend/place_recognition/vocabulary_file.h"
 
 namespace hybrid_slam {
@@ -117,11 +117,13 @@ int run(CommandLine line, const Interrupt& interrupt) {
   return kExitOk;
 }
 
-int guarded_main(int argc, char** argv) {
-  silence_solver_log();
-  spdlog::set_default_logger(spdlog::stderr_color_mt("hybrid_slam"));
-  spdlog::set_pattern("%n: %^%l%$: %v");
-  try {
+}  // namespace
+}  // namespace hybrid_slam
+
+int main(int argc, char** argv) {
+  using namespace hybrid_slam;
+  return run_program("hybrid_slam", [&]() -> int {
+    silence_solver_log();
     int exit_code = kExitOk;
     auto line = parse_command_line(argc, argv, exit_code);
     if (!line) {
@@ -129,19 +131,5 @@ int guarded_main(int argc, char** argv) {
     }
     const Interrupt interrupt;
     return run(std::move(*line), interrupt);
-  } catch (const InputError& error) {
-    spdlog::error(error.what());
-    return kExitBadInput;
-  } catch (const OutputError& error) {
-    spdlog::error(error.what());
-    return kExitBadInput;
-  } catch (const std::exception& error) {
-    spdlog::critical("internal error: {}", error.what());
-    return kExitInternalError;
-  }
+  });
 }
-
-}  // namespace
-}  // namespace hybrid_slam
-
-int main(int argc, char** argv) { return hybrid_slam::guarded_main(argc, argv); }

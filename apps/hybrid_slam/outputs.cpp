@@ -13,7 +13,7 @@
 #include "apps/io/report.h"
 #include "apps/slam/version.h"
 #include "backend/map/map_file.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 namespace {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string>
 
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 

@@ -1,7 +1,7 @@
 #include <cstdio>
 
 #include "apps/io/trajectory.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 #include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"
 

@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
+#include "apps/program/program.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -88,19 +90,13 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
                                         "colmap-binary of a COLMAP model, ply of a map, map of "
                                         "all but pose graphs");
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
-  try {
-    app.parse(argc, argv);
-    if (given_frame->count() > 0 && options.problem != ProblemKind::kLocal) {
-      throw CLI::ValidationError("--keyframe: goes with --problem local");
-    }
-    if (line.out.empty()) throw CLI::ValidationError("--out: \"\" is no name of a folder");
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {  // --help
-      exit_code = app.exit(error);
-    } else {
-      spdlog::error("{} (--help tells more)", error.what());
-      exit_code = kExitBadUsage;
-    }
+  if (const auto end = parse_line(app, argc, argv, [&] {
+        if (given_frame->count() > 0 && options.problem != ProblemKind::kLocal) {
+          throw CLI::ValidationError("--keyframe: goes with --problem local");
+        }
+        if (line.out.empty()) throw CLI::ValidationError("--out: \"\" is no name of a folder");
+      })) {
+    exit_code = *end;
     return std::nullopt;
   }
   if (given_format->count() > 0) line.format = format;

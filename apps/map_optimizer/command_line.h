@@ -17,15 +17,8 @@ struct CommandLine {
   bool quiet = false;
 };
 
-// Exit codes of the program, as --help lists them.
-enum ExitCode : int {
-  kExitOk = 0,
-  kExitInternalError = 1,
-  kExitBadUsage = 2,
-  kExitBadInput = 3,
-  kExitNoSolution = 4,
-  kExitInterrupted = 130
-};
+// Of this program alone, beside ExitCode.
+constexpr int kExitNoSolution = 4;
 
 // Reads the command line. Empty if the program shall end at once with `exit_code` (help, or bad
 // usage, which has been reported).

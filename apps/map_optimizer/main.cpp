@@ -1,34 +1,23 @@
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 
 #include "apps/io/report.h"
 #include "apps/map_optimizer/outputs.h"
+#include "apps/program/program.h"
 #include "backend/problem/solver_log.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 namespace {
-
-std::atomic<bool> interrupted = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
-
-// The first Ctrl-C ends the run in order; a second one kills the program as usual.
-void on_signal(int signal) {
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
-}
 
 // Frame by frame, with a line per update.
 void solve_incrementally(const CommandLine& line, const GraphFile& file, FactorGraph& problem,
                          OptimizerResult& result) {
   std::stop_source stop;
   const auto progress = [&](const UpdateRecord& update) {
-    if (interrupted) stop.request_stop();
+    if (interrupted()) stop.request_stop();
     if (line.quiet) return;
     fmt::print(stderr, "poses {:5}  cost {:<18.10g} {:.3f} ms\n", update.poses, update.cost,
                update.wall_ms);
@@ -43,7 +32,7 @@ void solve_incrementally(const CommandLine& line, const GraphFile& file, FactorG
 void solve(const CommandLine& line, OptimizerProblem& problem, OptimizerResult& result) {
   std::stop_source stop;
   const auto progress = [&](const IterationReport& report) {
-    if (interrupted) stop.request_stop();
+    if (interrupted()) stop.request_stop();
     if (line.quiet) return;
     fmt::print(stderr, "iteration {:3}  cost {:<18.10g} step {:<10.3g} {:.2f} s\n",
                report.iteration, report.cost, report.step_norm, report.seconds);
@@ -140,30 +129,17 @@ int run(const CommandLine& line) {
   return exit_code_of(result.solve);
 }
 
-int guarded_main(int argc, char** argv) {
-  silence_solver_log();
-  spdlog::set_default_logger(spdlog::stderr_color_mt("map_optimizer"));
-  spdlog::set_pattern("%n: %^%l%$: %v");
-  try {
-    int exit_code = kExitOk;
-    const auto line = parse_command_line(argc, argv, exit_code);
-    if (!line) return exit_code;
-    std::signal(SIGINT, on_signal);
-    std::signal(SIGTERM, on_signal);
-    return run(*line);
-  } catch (const InputError& error) {
-    spdlog::error(error.what());
-    return kExitBadInput;
-  } catch (const OutputError& error) {
-    spdlog::error(error.what());
-    return kExitBadInput;
-  } catch (const std::exception& error) {
-    spdlog::critical("internal error: {}", error.what());
-    return kExitInternalError;
-  }
-}
-
 }  // namespace
 }  // namespace hybrid_slam
 
-int main(int argc, char** argv) { return hybrid_slam::guarded_main(argc, argv); }
+int main(int argc, char** argv) {
+  using namespace hybrid_slam;
+  return run_program("map_optimizer", [&]() -> int {
+    silence_solver_log();
+    int exit_code = kExitOk;
+    const auto line = parse_command_line(argc, argv, exit_code);
+    if (!line) return exit_code;
+    watch_signals();
+    return run(*line);
+  });
+}

@@ -10,7 +10,7 @@
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
 #include "apps/slam/version.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 namespace {

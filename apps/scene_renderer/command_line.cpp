@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 
+#include "apps/program/program.h"
 #include "apps/slam/parallel_for.h"
 
 namespace hybrid_slam {
@@ -96,27 +97,21 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--threads", line.threads, "that render (default: one per core)")
       ->check(CLI::Range(1, 256).description(""));
   app.add_flag("--quiet", line.quiet, "no progress, errors only");
-  try {
-    app.parse(argc, argv);
-    if (line.out.empty()) throw CLI::ValidationError("OUT: \"\" is no name of a folder");
-    if (width && kind != SceneKind::kSurvey) {
-      throw CLI::ValidationError("--width needs --kind survey");
-    }
-    if (width && !(*width >= 1 && *width <= 50)) {  // not NaN, which CLI lets pass
-      throw CLI::ValidationError("--width: is no width between 1 and 50 m");
-    }
-    if (!resolution.empty()) parse_resolution(resolution, line);
-    if (line.sequence.empty()) {
-      line.sequence = kind == SceneKind::kSurvey ? "stereo" : "hybrid";
-    }
-    check_sequence_name(line.sequence);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {  // --help
-      exit_code = app.exit(error);
-    } else {
-      spdlog::error("{} (--help tells more)", error.what());
-      exit_code = kExitBadUsage;
-    }
+  if (const auto end = parse_line(app, argc, argv, [&] {
+        if (line.out.empty()) throw CLI::ValidationError("OUT: \"\" is no name of a folder");
+        if (width && kind != SceneKind::kSurvey) {
+          throw CLI::ValidationError("--width needs --kind survey");
+        }
+        if (width && !(*width >= 1 && *width <= 50)) {  // not NaN, which CLI lets pass
+          throw CLI::ValidationError("--width: is no width between 1 and 50 m");
+        }
+        if (!resolution.empty()) parse_resolution(resolution, line);
+        if (line.sequence.empty()) {
+          line.sequence = kind == SceneKind::kSurvey ? "stereo" : "hybrid";
+        }
+        check_sequence_name(line.sequence);
+      })) {
+    exit_code = *end;
     return std::nullopt;
   }
   line.options = make_scene_options(kind, difficulty, seed);

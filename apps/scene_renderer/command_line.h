@@ -19,15 +19,6 @@ struct CommandLine {
   bool quiet = false;
 };
 
-// Exit codes of the program, as --help lists them.
-enum ExitCode : int {
-  kExitOk = 0,
-  kExitInternalError = 1,
-  kExitBadUsage = 2,
-  kExitBadInput = 3,
-  kExitInterrupted = 130
-};
-
 // Reads the command line. Empty if the program shall end at once with `exit_code` (help, or bad
 // usage, which has been reported).
 std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_code);

@@ -9,8 +9,8 @@
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
 #include "apps/scene_renderer/rig_motion.h"
-#include "cameras/input_error.h"
-#include "cameras/output_file.h"
+#include "cameras/files/input_error.h"
+#include "cameras/files/output_file.h"
 #include "frontend/input/text_file.h"
 
 namespace hybrid_slam {

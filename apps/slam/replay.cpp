@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "apps/slam/recorder.h"
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 namespace {

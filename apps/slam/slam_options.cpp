@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "cameras/yaml_section.h"
+#include "cameras/files/yaml_section.h"
 
 namespace hybrid_slam {
 namespace {

@@ -1,6 +1,5 @@
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <map>
 #include <numbers>
 #include <string>
@@ -11,13 +10,12 @@
 
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
+#include "apps/program/program.h"
 #include "apps/trajectory_eval/hybrid.h"
 #include "frontend/input/text_file.h"
 
 namespace hybrid_slam {
 namespace {
-
-enum ExitCode { kOk = 0, kInternalError = 1, kBadUsage = 2, kBadInput = 3 };
 
 constexpr const char* kDescription =
     "Compares an estimated trajectory with the truth.\n"
@@ -164,12 +162,8 @@ int run(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(kTruthConventions).description(""))
       ->option_text("auto|world_from_cam|cam_from_world");
   app.add_flag("--json", options.json, "print JSON");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "trajectory_eval: {} (--help tells more)\n", error.what());
-    return kBadUsage;
+  if (const auto end = parse_line(app, argc, argv)) {
+    return *end;
   }
   if (options.metric == "hybrid") {
     evaluate_hybrid(options.estimate, options.truth, options.convention, options.max_difference,
@@ -177,20 +171,13 @@ int run(int argc, char** argv) {
   } else {
     evaluate(options);
   }
-  return kOk;
+  return kExitOk;
 }
 
 }  // namespace
 }  // namespace hybrid_slam
 
 int main(int argc, char** argv) {
-  try {
-    return hybrid_slam::run(argc, argv);
-  } catch (const hybrid_slam::InputError& error) {
-    std::fprintf(stderr, "trajectory_eval: %s\n", error.what());
-    return hybrid_slam::kBadInput;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "trajectory_eval: internal error: %s\n", error.what());
-    return hybrid_slam::kInternalError;
-  }
+  using namespace hybrid_slam;
+  return run_program("trajectory_eval", [&] { return run(argc, argv); });
 }

@@ -2,21 +2,17 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <functional>
 #include <optional>
 
 #include "apps/io/progress_line.h"
+#include "apps/program/program.h"
 #include "apps/slam/parallel_for.h"
 #include "apps/vocabulary_trainer/training_run.h"
-#include "cameras/input_error.h"
-#include "cameras/output_file.h"
 #include "frontend/place_recognition/vocabulary_file.h"
 
 namespace hybrid_slam {
 namespace {
-
-enum ExitCode { kOk = 0, kInternalError = 1, kBadUsage = 2, kBadInput = 3 };
 
 constexpr const char* kDescription =
     "Trains a vocabulary for place recognition on the SIFT features of images, or converts one.";
@@ -117,38 +113,25 @@ int run(int argc, char** argv) {
   CLI::App app(kDescription);
   app.footer(kFooter);
   add_options(app, options);
-  try {
-    app.parse(argc, argv);
-    if (options.images.empty() == options.convert.empty()) {
-      throw CLI::ValidationError("either IMAGES or --convert is needed");
-    }
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "vocabulary_trainer: {} (--help tells more)\n", error.what());
-    return kBadUsage;
+  if (const auto end = parse_line(app, argc, argv, [&] {
+        if (options.images.empty() == options.convert.empty()) {
+          throw CLI::ValidationError("either IMAGES or --convert is needed");
+        }
+      })) {
+    return *end;
   }
   if (options.convert.empty()) {
     train(options);
   } else {
     save(options, load_vocabulary(options.convert));
   }
-  return kOk;
+  return kExitOk;
 }
 
 }  // namespace
 }  // namespace hybrid_slam
 
 int main(int argc, char** argv) {
-  try {
-    return hybrid_slam::run(argc, argv);
-  } catch (const hybrid_slam::InputError& error) {
-    std::fprintf(stderr, "vocabulary_trainer: %s\n", error.what());
-    return hybrid_slam::kBadInput;
-  } catch (const hybrid_slam::OutputError& error) {
-    std::fprintf(stderr, "vocabulary_trainer: %s\n", error.what());
-    return hybrid_slam::kBadInput;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "vocabulary_trainer: internal error: %s\n", error.what());
-    return hybrid_slam::kInternalError;
-  }
+  using namespace hybrid_slam;
+  return run_program("vocabulary_trainer", [&] { return run(argc, argv); });
 }

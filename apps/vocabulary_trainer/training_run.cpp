@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "apps/slam/parallel_for.h"
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 #include "frontend/input/image_file.h"
 #include "frontend/place_recognition/descriptor_store.h"
 

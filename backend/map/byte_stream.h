@@ -7,7 +7,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

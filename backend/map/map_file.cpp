@@ -4,7 +4,7 @@
 #include "backend/map/map_encoding.h"
 #include "backend/map/map_file_format.h"
 #include "backend/map/section_file.h"
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

@@ -18,9 +18,9 @@ struct LoadedMap {
   MapFileInfo info;
 };
 
-// Writes the map into a file, whole or not at all (cameras/output_file.h); docs/map_file.md tells
-// what is where. The same map gives the same bytes. Needs a few megabytes of memory, whatever the
-// size of the map. Throws OutputError.
+// Writes the map into a file, whole or not at all (cameras/files/output_file.h); docs/map_file.md
+// tells what is where. The same map gives the same bytes. Needs a few megabytes of memory, whatever
+// the size of the map. Throws OutputError.
 void save_map(const std::filesystem::path& path, const MapSnapshot& map, const MapFileInfo& info);
 
 // The map as it was saved: whatever is done to it from here on has the same outcome as with the one

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "backend/map/byte_stream.h"
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 

@@ -2,7 +2,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "cameras/yaml_section.h"
+#include "cameras/files/yaml_section.h"
 #include "frontend/input/file_sequence.h"
 #include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"

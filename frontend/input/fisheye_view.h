@@ -5,7 +5,7 @@
 #include <string>
 
 #include "cameras/camera.h"
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 #include "frontend/features/image.h"
 
 namespace hybrid_slam {

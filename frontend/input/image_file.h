@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 #include "frontend/features/image.h"
 
 namespace hybrid_slam {

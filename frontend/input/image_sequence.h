@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "cameras/camera.h"
+#include "cameras/files/input_error.h"
 #include "cameras/geometry/rigid3d.h"
-#include "cameras/input_error.h"
 #include "frontend/features/image.h"
 
 namespace hybrid_slam {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

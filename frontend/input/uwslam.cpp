@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cameras/calibration_file.h"
+#include "cameras/calibration/calibration_file.h"
 #include "frontend/input/camera_poses.h"
 #include "frontend/input/file_sequence.h"
 #include "frontend/input/text_file.h"

@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

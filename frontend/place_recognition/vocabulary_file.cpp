@@ -8,8 +8,8 @@
 #include <stdexcept>
 
 #include "backend/map/byte_stream.h"
-#include "cameras/input_error.h"
-#include "cameras/output_file.h"
+#include "cameras/files/input_error.h"
+#include "cameras/files/output_file.h"
 #include "frontend/place_recognition/mapped_file.h"
 #include "frontend/place_recognition/vocabulary_text.h"
 

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 namespace {

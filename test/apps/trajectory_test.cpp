@@ -4,7 +4,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 #include "test/apps/trajectories.h"
 
 namespace hybrid_slam {

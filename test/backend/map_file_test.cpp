@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 #include "test/backend/same_map.h"
 #include "test/support/random_edits.h"
 #include "test/support/temp_folder.h"

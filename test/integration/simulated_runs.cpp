@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "backend/map/map_file.h"
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 #include "test/frontend/place_recognition/sample_vocabulary.h"
 #include "test/support/temp_folder.h"
 

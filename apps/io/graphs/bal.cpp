@@ -6,8 +6,8 @@
 
 #include "apps/io/graphs/landmark_index.h"
 #include "apps/io/graphs/text_scanner.h"
+#include "cameras/files/output_file.h"
 #include "cameras/geometry/so3.h"
-#include "cameras/output_file.h"
 
 namespace hybrid_slam {
 

@@ -9,7 +9,7 @@
 
 #include "apps/io/graphs/colmap_rigs.h"
 #include "apps/io/graphs/graph_errors.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 

@@ -2,7 +2,7 @@
 
 #include "apps/io/graphs/binary_scanner.h"
 #include "apps/io/graphs/colmap_model.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 

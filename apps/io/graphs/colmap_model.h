@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "cameras/files/input_error.h"
 #include "cameras/geometry/rigid3d.h"
-#include "cameras/input_error.h"
 
 namespace hybrid_slam {
 

@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "apps/io/graphs/text_scanner.h"
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 #include "frontend/input/pose_rows.h"
 
 namespace hybrid_slam {

@@ -11,7 +11,7 @@
 
 #include "backend/map/map_snapshot.h"
 #include "backend/problem/factor_graph.h"
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

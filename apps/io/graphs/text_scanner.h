@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

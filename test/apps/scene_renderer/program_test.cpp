@@ -5,7 +5,7 @@
 
 #include "apps/io/trajectory.h"
 #include "apps/scene_renderer/rig_motion.h"
-#include "cameras/calibration_file.h"
+#include "cameras/calibration/calibration_file.h"
 #include "frontend/input/image_sequence.h"
 #include "test/support/child_process.h"
 #include "test/support/temp_folder.h"

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
-#include "frontend/features/cuda/matcher_engine.h"
 #include "frontend/features/cuda/on_host.h"
 #include "frontend/matching/circular_matcher.h"
+#include "frontend/matching/cuda/matcher_engine.h"
 
 namespace hybrid_slam::cuda {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "cameras/input_error.h"
-#include "cameras/output_file.h"
+#include "cameras/files/input_error.h"
+#include "cameras/files/output_file.h"
 #include "test/frontend/place_recognition/sample_vocabulary.h"
 #include "test/support/allocation_watch.h"
 #include "test/support/temp_folder.h"

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "cameras/camera.h"
+#include "cameras/files/input_error.h"
 #include "cameras/geometry/rigid3d.h"
-#include "cameras/input_error.h"
 
 // Readers of the calibration files in use. Each checks every value and throws InputError with one
 // line, file:line: key: reason. OpenCV's "%YAML:1.0" header and "!!opencv-matrix" are understood

@@ -1,7 +1,7 @@
-#include "frontend/features/cuda/cuda_matcher.h"
+#include "frontend/matching/cuda/cuda_matcher.h"
 
 #include "frontend/features/cuda/cuda_sift_engine.cuh"
-#include "frontend/features/cuda/matcher_engine.h"
+#include "frontend/matching/cuda/matcher_engine.h"
 
 namespace hybrid_slam {
 

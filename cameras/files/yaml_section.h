@@ -6,7 +6,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "cameras/input_error.h"
+#include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
 

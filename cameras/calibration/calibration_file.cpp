@@ -1,4 +1,4 @@
-#include "cameras/calibration_file.h"
+#include "cameras/calibration/calibration_file.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "cameras/yaml_section.h"
+#include "cameras/files/yaml_section.h"
 
 namespace hybrid_slam {
 namespace {

@@ -14,13 +14,13 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/features/cuda/cuda_matcher.h"
 #include "frontend/features/cuda/cuda_sift.h"
-#include "frontend/features/cuda/matcher_engine.h"
 #include "frontend/features/cuda/on_device.cuh"
 #include "frontend/features/cuda/on_host.h"
-#include "frontend/features/cuda/program_images.h"
 #include "frontend/features/cuda/sift_engine.h"
+#include "frontend/matching/cuda/cuda_matcher.h"
+#include "frontend/matching/cuda/matcher_engine.h"
+#include "test/frontend/cuda/program_images.h"
 
 namespace hybrid_slam::cuda {
 namespace {

@@ -1,4 +1,4 @@
-#include "cameras/output_file.h"
+#include "cameras/files/output_file.h"
 
 #include <sys/resource.h>
 

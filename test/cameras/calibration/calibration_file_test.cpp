@@ -1,4 +1,4 @@
-#include "cameras/calibration_file.h"
+#include "cameras/calibration/calibration_file.h"
 
 #include <cstdlib>
 #include <filesystem>

@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/features/cuda/cuda_matcher.h"
 #include "frontend/features/cuda/cuda_sift.h"
-#include "frontend/features/cuda/program_images.h"
+#include "frontend/matching/cuda/cuda_matcher.h"
+#include "test/frontend/cuda/program_images.h"
 
 namespace hybrid_slam::cuda {
 namespace {

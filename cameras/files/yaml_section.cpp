@@ -1,4 +1,4 @@
-#include "cameras/yaml_section.h"
+#include "cameras/files/yaml_section.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/features/cuda/match_kernels.h"
 #include "frontend/matching/brute_force.h"
 #include "frontend/matching/circular_match.h"
+#include "frontend/matching/cuda/match_kernels.h"
 
 namespace hybrid_slam::cuda {
 

@@ -1,0 +1,63 @@
+#include "apps/program/program.h"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+
+#include "cameras/files/input_error.h"
+#include "cameras/files/output_file.h"
+
+namespace hybrid_slam {
+namespace {
+
+std::atomic<bool> signalled = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
+
+void on_signal(int signal) {
+  signalled = true;
+  std::signal(signal, SIG_DFL);
+}
+
+}  // namespace
+
+int run_program(const std::string& name, const std::function<int()>& body) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+  spdlog::set_pattern("%n: %^%l%$: %v");
+  try {
+    return body();
+  } catch (const InputError& error) {
+    spdlog::error("{}", error.what());
+    return kExitBadInput;
+  } catch (const OutputError& error) {
+    spdlog::error("{}", error.what());
+    return kExitBadInput;
+  } catch (const std::exception& error) {
+    spdlog::critical("internal error: {}", error.what());
+    return kExitInternalError;
+  }
+}
+
+std::optional<int> parse_line(CLI::App& app, int argc, char** argv,
+                              const std::function<void()>& check) {
+  try {
+    app.parse(argc, argv);
+    if (check) check();
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help
+    spdlog::error("{} (--help tells more)", error.what());
+    return kExitBadUsage;
+  }
+}
+
+void watch_signals() {
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+}
+
+bool interrupted() { return signalled; }
+
+}  // namespace hybrid_slam
