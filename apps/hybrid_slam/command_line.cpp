@@ -6,6 +6,7 @@
 #include <map>
 
 #include "apps/program/program.h"
+#include "apps/slam/log.h"
 #include "apps/slam/parallel_for.h"
 
 namespace hybrid_slam {
@@ -17,6 +18,9 @@ constexpr const char* kFooter = R"(Writes to DIR:
   fisheye.tum, fisheye_online.tum   the same of the fisheye
   map.hslam          the whole map, to go on with (docs/map_file.md); not with --localize
   map.ply, map.png   landmarks and keyframes; map and path from above and from the side
+  frames.csv         written as it happens: a line per camera frame with its state, pose and
+                     covariance, and what was wrong with it
+  fisheye_in_left.csv  likewise: pose of the fisheye in the left camera, and covariance
   timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
   timing.csv         CPU time per stereo frame, of the whole process
   loops.csv          places that were proposed as loops, and what came of them
@@ -134,10 +138,19 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       ->option_text("on|off");
   app.add_option("--map", line.map, "map file (map.hslam) to go on with")->option_text("FILE");
   app.add_flag("--localize", line.localize, "track in the map of --map without changing it");
+  app.add_option("--log", line.log, "file for what happens on the way and why; gone on with")
+      ->option_text("FILE");
+  auto* const log_level = app.add_option("--log-level", line.log_level,
+                                         "trace, debug, info (default), warning or error")
+                              ->check(must_be(is_log_level, "is no level"))
+                              ->option_text("LEVEL");
   app.add_flag("--quiet", line.quiet, "no progress, warnings and errors only");
   if (const auto end = parse_line(app, argc, argv, [&] {
         if (line.rate > 0 && line.mode != SessionMode::kRealtime) {
           throw CLI::ValidationError("--rate needs --mode realtime");
+        }
+        if (log_level->count() > 0 && line.log.empty()) {
+          throw CLI::ValidationError("--log-level needs --log");
         }
         if (line.localize && line.map.empty()) {
           throw CLI::ValidationError("--localize needs --map");

@@ -26,8 +26,10 @@ struct CommandLine {
   std::size_t limit = 0;
   int checkpoint_every = 0;  // keyframes; 0: never
   bool quiet = false;
-  std::string map;         // a file to go on with; empty: a new map
-  bool localize = false;   // track in the map without changing it
+  std::string map;        // a file to go on with; empty: a new map
+  bool localize = false;  // track in the map without changing it
+  std::string log;        // a file; empty: none
+  std::string log_level = "info";
   std::string vocabulary;  // a file; empty: the one that is part of the program
   SlamOptions options;
 };

@@ -5,10 +5,12 @@
 #include <filesystem>
 
 #include "apps/hybrid_slam/command_line.h"
+#include "apps/hybrid_slam/frame_writer.h"
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/io/progress_line.h"
 #include "apps/program/program.h"
 #include "apps/slam/interrupt.h"
+#include "apps/slam/log.h"
 #include "apps/slam/replay.h"
 #include "backend/map/map_file.h"
 #include "backend/problem/solver_log.h"
@@ -60,6 +62,7 @@ int run(CommandLine line, const Interrupt& interrupt) {
   const auto sequence =
       open_sequence(line.dataset, line.layout, line.sequence, line.cameras, line.truth_convention);
   make_output_folder(line.out);
+  if (!line.log.empty()) open_log(line.log, line.log_level);
   for (const std::string& warning : sequence->info().warnings) {
     spdlog::warn(warning);
   }
@@ -79,6 +82,9 @@ int run(CommandLine line, const Interrupt& interrupt) {
     progress.finish();
     spdlog::warn(text);
   };
+  FrameWriter writer(line.out, sequence->info().fisheye.has_value(), hooks.warning);
+  hooks.frame = [&](const FrameResult& frame) { writer.frame(frame); };
+  hooks.left_out = [&](const LeftOut& input) { writer.left_out(input); };
   hooks.cancelled = interrupt.token();
   SessionOptions& session = options.session;
   session.mode = line.mode;

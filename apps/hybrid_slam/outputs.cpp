@@ -128,6 +128,18 @@ Json options_json(const CommandLine& line, const RunResult& result, bool hybrid)
           {"refine_tracks", options.tracking.refinement.enabled}};
 }
 
+// "states" and "causes": how many frames had each; all states, and the causes that there were.
+void add_conditions(Json& json, const FrameConditions& conditions) {
+  Json& states = json["states"] = Json::object();
+  for (const TrackingState state :
+       {TrackingState::kStarting, TrackingState::kMap, TrackingState::kOdometry,
+        TrackingState::kRelocalised, TrackingState::kLost}) {
+    const auto found = conditions.states.find(to_string(state));
+    states[to_string(state)] = found == conditions.states.end() ? 0 : found->second;
+  }
+  json["causes"] = conditions.causes.empty() ? Json::object() : Json(conditions.causes);
+}
+
 // What a fisheye adds to the summary.
 Json fisheye_json(const RunResult& result, const RunSummary& summary) {
   const FrameCounts& frames = result.fisheye_frames;
@@ -138,7 +150,8 @@ Json fisheye_json(const RunResult& result, const RunSummary& summary) {
                     {"lost", frames.lost},
                     {"missing", frames.corrupt}};
   json["poses_from"] = count_by(result.fisheye_records,
-                                [](const TrackedFrame& frame) { return to_string(frame.source); });
+                                [](const RecordedFrame& frame) { return to_string(frame.source); });
+  add_conditions(json, result.fisheye_conditions);
   json["keyframes"] = found.keyframes.size();
   json["landmarks"] = found.landmarks.size();
   json["relative_pose_error"] = summary.hybrid ? to_json(*summary.hybrid) : Json();
@@ -164,9 +177,10 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
                     {"dropped", frames.dropped},
                     {"corrupt", frames.corrupt}};
   json["poses_from"] =
-      count_by(result.records, [](const TrackedFrame& frame) { return to_string(frame.source); });
+      count_by(result.records, [](const RecordedFrame& frame) { return to_string(frame.source); });
   json["predictions_from"] = count_by(
-      result.records, [](const TrackedFrame& frame) { return to_string(frame.prediction); });
+      result.records, [](const RecordedFrame& frame) { return to_string(frame.prediction); });
+  add_conditions(json, result.conditions);
   json["keyframes"] = result.map->keyframe_count();
   json["landmarks"] = result.map->landmark_count();
   json["loops"] = to_json(result.loops);

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "cameras/geometry/sim3d.h"
@@ -12,8 +13,11 @@ namespace hybrid_slam {
 
 using Trajectory = std::vector<StampedPose>;  // ascending in time
 
-// TUM text: "t tx ty tz qx qy qz qw" per line [s, m], world_from_cam, with qw >= 0. Throws
-// OutputError.
+// A line of TUM text: "t tx ty tz qx qy qz qw" [s, m], world_from_cam, with qw >= 0. A pose that
+// is not finite is a std::logic_error.
+std::string tum_line(const StampedPose& pose);
+
+// A line per pose. Throws OutputError.
 void write_tum(const std::filesystem::path& path, std::span<const StampedPose> trajectory);
 
 struct TrajectoryFile {

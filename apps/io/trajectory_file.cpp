@@ -1,4 +1,4 @@
-#include <cstdio>
+#include <fmt/format.h>
 
 #include "apps/io/trajectory.h"
 #include "cameras/files/output_file.h"
@@ -20,22 +20,20 @@ StampedPose tum_pose(const NumberRow& row, const std::filesystem::path& path) {
 
 }  // namespace
 
+std::string tum_line(const StampedPose& pose) {
+  const auto& t = pose.world_from_cam.translation();
+  Eigen::Vector4d q = pose.world_from_cam.rotation().coeffs();
+  if (q.w() < 0) q = -q;
+  if (!q.allFinite() || !t.allFinite()) {
+    throw std::logic_error("a pose of the trajectory is not finite");
+  }
+  return fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}", pose.time, t.x(),
+                     t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+}
+
 void write_tum(const std::filesystem::path& path, std::span<const StampedPose> trajectory) {
   std::string text;
-  for (const StampedPose& pose : trajectory) {
-    const auto& t = pose.world_from_cam.translation();
-    Eigen::Vector4d q = pose.world_from_cam.rotation().coeffs();
-    if (q.w() < 0) q = -q;
-    char line[400];
-    const int length =
-        std::snprintf(line, sizeof(line), "%.9f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", pose.time,
-                      t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
-    if (length < 0 || static_cast<std::size_t>(length) >= sizeof(line) || !q.allFinite() ||
-        !t.allFinite()) {
-      throw std::logic_error("a pose of the trajectory is not finite");
-    }
-    text += line;
-  }
+  for (const StampedPose& pose : trajectory) text += tum_line(pose) + '\n';
   write_file(path, text);
 }
 

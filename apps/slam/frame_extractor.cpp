@@ -1,5 +1,6 @@
 #include "apps/slam/frame_extractor.h"
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <utility>
@@ -40,6 +41,12 @@ GrayImage both(const GrayImage& a, const GrayImage& b) {
   return mask;
 }
 
+bool hardly_matches(const StereoFeatures& features) {
+  const auto matches = std::count_if(features.right_of_left.begin(), features.right_of_left.end(),
+                                     [](int right) { return right >= 0; });
+  return 10 * matches < static_cast<std::ptrdiff_t>(features.left.size());
+}
+
 }  // namespace
 
 FrameExtractor::FrameExtractor(const CameraRig& cameras, const SlamOptions& options,
@@ -67,7 +74,8 @@ std::vector<FeatureSet> FrameExtractor::find_features(const StereoImages& images
   return found;
 }
 
-CameraFrame FrameExtractor::extract(const StereoImages& images, StageTimes& times) {
+CameraFrame FrameExtractor::extract(const StereoImages& images, bool check_pair,
+                                    StageTimes& times) {
   StageClock clock(times);
   std::vector<FeatureSet> found = find_features(images, times);
   clock.lap("sift");
@@ -77,10 +85,19 @@ CameraFrame FrameExtractor::extract(const StereoImages& images, StageTimes& time
       match_stereo(std::move(found[0]), std::move(found[1]), left_pyramid.get(), &right_pyramid,
                    cameras_.stereo, options_.stereo);
   clock.lap("stereo_match");
+  FrameEvidence evidence{{image_quality(images.left), image_quality(images.right)},
+                         masked_share(images.mask),
+                         std::nullopt,
+                         0,
+                         0};
+  if (check_pair || hardly_matches(features)) {
+    evidence.pair = hybrid_slam::check_pair(features.left, features.right);
+  }
+  clock.lap("diagnose");
   Frame frame = make_frame(0, to_seconds(images.time), std::move(features), images.left.width,
                            images.left.height);
   frame.image = std::move(left_pyramid);
-  return {CameraKind::kStereo, images.time, std::move(frame)};
+  return {CameraKind::kStereo, images.time, std::move(frame), std::move(evidence)};
 }
 
 CameraFrame FrameExtractor::extract(const FisheyeImage& images, StageTimes& times) {
@@ -95,7 +112,9 @@ CameraFrame FrameExtractor::extract(const FisheyeImage& images, StageTimes& time
       make_mono_frame(0, to_seconds(images.time), std::move(found[0]), image.width, image.height);
   frame.image = std::make_shared<const ImagePyramid>(image);
   clock.lap("fisheye_sift");
-  return {CameraKind::kFisheye, images.time, std::move(frame)};
+  FrameEvidence evidence{{image_quality(images.image)}, masked_share(images.mask), {}, 0, 0};
+  clock.lap("diagnose");
+  return {CameraKind::kFisheye, images.time, std::move(frame), std::move(evidence)};
 }
 
 }  // namespace hybrid_slam

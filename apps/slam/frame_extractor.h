@@ -34,7 +34,9 @@ class FrameExtractor {
                  const FirstImages& first);
   ~FrameExtractor();
 
-  CameraFrame extract(const StereoImages& images, StageTimes& times);
+  // `check_pair`: whether the images are a pair is looked at in any case; else only where hardly
+  // anything matches.
+  CameraFrame extract(const StereoImages& images, bool check_pair, StageTimes& times);
   CameraFrame extract(const FisheyeImage& image, StageTimes& times);
 
   const UpsamplingEvidence& upsampling() const { return upsampling_; }

@@ -9,6 +9,13 @@ namespace {
 // Inputs of a camera that wait for a thread at most, where the oldest are dropped.
 constexpr std::ptrdiff_t kBacklog = 2;
 
+// Inputs left out that wait to be told at most; more are counted alone.
+constexpr std::size_t kLeftOutBacklog = 1000;
+
+// Every so many moments, and in the first ones, stereo images are checked for being a pair.
+constexpr std::int64_t kPairCheckPeriod = 32;
+constexpr std::int64_t kFirstPairs = 3;
+
 // So many inputs without enough of each camera: what is here must do.
 constexpr std::size_t kStartAnyway = 20;
 
@@ -43,9 +50,11 @@ FrameStream::~FrameStream() { cancel(); }
 PushResult FrameStream::push(SensorInput input) {
   const PushResult complaint = check(input);
   const CameraKind camera = camera_of(input);
+  const Nanoseconds time = time_of(input);
   Lock lock(mutex_);
   if (complaint != PushResult::kTaken) {
     ++counts_of(camera).refused;
+    leave_out(camera, time, to_string(complaint));
     return complaint;
   }
   if (!stream_.drop) {
@@ -60,6 +69,7 @@ PushResult FrameStream::push(SensorInput input) {
   counts.taken += result == PushResult::kTaken ? 1 : 0;
   counts.late += result == PushResult::kLate ? 1 : 0;
   counts.duplicate += result == PushResult::kDuplicate ? 1 : 0;
+  if (result != PushResult::kTaken) leave_out(camera, time, to_string(result));
   release(false);
   changed_.notify_all();
   return result;
@@ -86,7 +96,7 @@ void FrameStream::append(SensorInput input) {
   if (moment_ < 0 || time != moment_time_) ++moment_;
   moment_time_ = time;
   const bool first = !extractor_ && !std::holds_alternative<ExtractedFrame>(input);
-  Released released{camera_of(input), moment_, first, {}};
+  Released released{camera_of(input), time, moment_, first, {}};
   if (auto* pair = std::get_if<StereoImages>(&input)) {
     auto shared = std::make_shared<const StereoImages>(std::move(*pair));
     if (first && first_.stereo.size() < FirstImages::kStereo) first_.stereo.push_back(shared);
@@ -105,8 +115,15 @@ void FrameStream::append(SensorInput input) {
 void FrameStream::drop_oldest(CameraKind camera) {
   const auto droppable = [&](const Released& one) { return one.camera == camera && !one.first; };
   if (std::count_if(released_.begin(), released_.end(), droppable) <= kBacklog) return;
-  released_.erase(std::find_if(released_.begin(), released_.end(), droppable));
+  const auto oldest = std::find_if(released_.begin(), released_.end(), droppable);
+  leave_out(camera, oldest->time, kDropped);
+  released_.erase(oldest);
   ++counts_of(camera).dropped;
+}
+
+void FrameStream::leave_out(CameraKind camera, Nanoseconds time, const char* reason) {
+  if (left_out_.size() < kLeftOutBacklog) left_out_.push_back({camera, time, reason});
+  changed_.notify_all();
 }
 
 // Whether the next one can be extracted: the first ones wait for one another.
@@ -185,7 +202,9 @@ CameraFrame FrameStream::extract(Released input, StageTimes& times) {
     }
     const auto* pair = std::get_if<std::shared_ptr<const StereoImages>>(&input.image);
     return pair != nullptr
-               ? extractor_->extract(**pair, times)
+               ? extractor_->extract(
+                     **pair, input.moment < kFirstPairs || input.moment % kPairCheckPeriod == 0,
+                     times)
                : extractor_->extract(*std::get<std::shared_ptr<const FisheyeImage>>(input.image),
                                      times);
   };
@@ -195,21 +214,25 @@ CameraFrame FrameStream::extract(Released input, StageTimes& times) {
   return frame;
 }
 
-std::optional<CameraFrame> FrameStream::next() {
+std::optional<StreamItem> FrameStream::next() {
   Lock lock(mutex_);
   changed_.wait(lock, [this] {
-    return cancelled_ || failure_ || ready_.contains(consumed_) ||
+    return cancelled_ || failure_ || !left_out_.empty() || ready_.contains(consumed_) ||
            (is_over() && begun_ == consumed_);
   });
   if (failure_) std::rethrow_exception(failure_);
+  StreamItem item;
+  item.left_out = std::exchange(left_out_, {});
   const auto at = ready_.find(consumed_);
-  if (cancelled_ || at == ready_.end()) return std::nullopt;
-  CameraFrame frame = std::move(at->second);
+  if (cancelled_ || at == ready_.end()) {
+    return cancelled_ || item.left_out.empty() ? std::nullopt : std::optional(std::move(item));
+  }
+  item.frame = std::move(at->second);
   ready_.erase(at);
   ++consumed_;
   ++given_;
   changed_.notify_all();
-  return frame;
+  return item;
 }
 
 void FrameStream::done() {

@@ -34,6 +34,12 @@ struct StreamCounts {
   std::int64_t dropped = 0;  // taken, but older than others when there was time for them
 };
 
+// What came of the inputs next: a frame, inputs that were left out meanwhile, or both.
+struct StreamItem {
+  std::optional<CameraFrame> frame;
+  std::vector<LeftOut> left_out;
+};
+
 // Turns what is pushed, by any thread and in any order within the window, into frames in the order
 // of their times. Features are extracted in threads of its own.
 class FrameStream {
@@ -45,9 +51,9 @@ class FrameStream {
   // Waits for room, unless frames are dropped.
   PushResult push(SensorInput input);
 
-  // Waits for the next frame; none after the last, once this is closed or cancelled. Rethrows what
-  // an extracting thread threw. One thread.
-  std::optional<CameraFrame> next();
+  // Waits for the next frame, or for an input that is left out; none after the last, once this is
+  // closed or cancelled. Rethrows what an extracting thread threw. One thread.
+  std::optional<StreamItem> next();
 
   // Who took a frame from next() is done with it.
   void done();
@@ -78,6 +84,7 @@ class FrameStream {
                              std::shared_ptr<const FisheyeImage>, ExtractedFrame>;
   struct Released {
     CameraKind camera = CameraKind::kStereo;
+    Nanoseconds time = 0;
     std::int64_t moment = 0;  // counts different times
     bool first = false;       // before there was an extractor: not dropped
     Image image;
@@ -91,6 +98,7 @@ class FrameStream {
   void release(bool flush);
   void append(SensorInput input);
   void drop_oldest(CameraKind camera);
+  void leave_out(CameraKind camera, Nanoseconds time, const char* reason);
   bool can_begin() const;
   bool is_over() const;
   std::size_t in_flight() const { return released_.size() + (begun_ - consumed_); }
@@ -112,7 +120,8 @@ class FrameStream {
   std::size_t given_ = 0;  // and not yet done()
   std::int64_t moment_ = -1;
   Nanoseconds moment_time_ = 0;
-  StreamCounts counts_[2];  // by CameraKind
+  StreamCounts counts_[2];         // by CameraKind
+  std::vector<LeftOut> left_out_;  // and not yet told
   StageTimes times_;
   bool settle_now_ = false;  // with the first images that are here
   bool closed_ = false;

@@ -42,6 +42,18 @@ TrackingState state_of(const TrackedFrame& tracked, const MapSnapshot& map) {
 
 }  // namespace
 
+const char* to_string(MapChange change) {
+  switch (change) {
+    case MapChange::kKeyframe:
+      return "keyframe";
+    case MapChange::kLoop:
+      return "loop closed";
+    case MapChange::kFullBundle:
+      break;
+  }
+  return "all adjusted";
+}
+
 const char* to_string(TrackingState state) {
   switch (state) {
     case TrackingState::kStarting:
@@ -67,7 +79,8 @@ FrameTracking::FrameTracking(const CameraRig& cameras, const SlamOptions& option
       observers_(observers),
       times_(times),
       localize_(localize),
-      first_index_(next_frame_index(mapping.map().view())) {
+      first_index_(next_frame_index(mapping.map().view())),
+      diagnosis_(options.features, cameras.fisheye.has_value()) {
   if (localize_ && !mapping.map().view().origin().valid()) {
     throw std::logic_error("FrameTracking: nothing to localise in");
   }
@@ -88,10 +101,17 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
       static_cast<int>(std::count_if(rights.begin(), rights.end(), [](int k) { return k >= 0; }));
   result.keyframes = map.keyframe_count();
   result.landmarks = map.landmark_count();
+  result.mapping_behind = !allow_keyframe;
+  result.causes = diagnosis_.look(frame);
   TrackedFrame tracked = track_by_camera(frame, map, allow_keyframe && !localize_);
   if (!localize_) counts_.add(tracked.counts);  // else no keyframe would take them
   result.index = tracked.frame_index;
   result.state = state_of(tracked, map);
+  if (frame.camera == CameraKind::kFisheye) {
+    if (tracked.tracked()) result.left_from_fisheye = left_from_fisheye(map);
+  } else if (const auto cause = Diagnosis::look_at_offset(tracked.disparity_offset)) {
+    result.causes.push_back(*cause);
+  }
   auto keyframe = std::exchange(tracked.keyframe, std::nullopt);
   tracked.counts = {};
   result.tracked = std::move(tracked);
@@ -100,6 +120,16 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
   const KeyframeId reference = keyframe->reference;
   return MappingJob{frame.camera, std::move(*keyframe),
                     reference.valid() ? map.cam_from_world(reference) : Rigid3d(), counts_.take()};
+}
+
+// Where both cameras have a pose of this moment.
+std::optional<UncertainMotion> FrameTracking::left_from_fisheye(const MapSnapshot& map) const {
+  const UncertainPose* const left = stereo_.uncertain_pose();
+  const UncertainPose* const fisheye = fisheye_->uncertain_pose();
+  if (left == nullptr || fisheye == nullptr || left->frame_index != fisheye->frame_index) {
+    return std::nullopt;
+  }
+  return relative_pose(map, *left, *fisheye);
 }
 
 TrackedFrame FrameTracking::track_by_camera(CameraFrame& frame, const MapSnapshot& map,

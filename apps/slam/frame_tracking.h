@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "apps/slam/diagnosis.h"
 #include "apps/slam/local_mapping.h"
 #include "apps/slam/observers.h"
 #include "frontend/place_recognition/keyframe_database.h"
@@ -29,6 +30,7 @@ class FrameTracking {
   std::shared_ptr<KeyframeDatabase> places() const { return places_; }
 
  private:
+  std::optional<UncertainMotion> left_from_fisheye(const MapSnapshot& map) const;
   TrackedFrame track_by_camera(CameraFrame& frame, const MapSnapshot& map, bool allow_keyframe);
 
   std::shared_ptr<KeyframeDatabase> places_;
@@ -40,6 +42,7 @@ class FrameTracking {
   std::int64_t first_index_;     // of this session's frames in the map, after those of others
   KeyframeId stereo_reference_;  // of the last stereo frame; invalid if that was lost
   LandmarkCounts counts_;        // since the last keyframe
+  Diagnosis diagnosis_;
 };
 
 }  // namespace hybrid_slam

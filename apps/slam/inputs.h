@@ -4,9 +4,12 @@
 #include <cstdint>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "cameras/camera.h"
 #include "frontend/features/image.h"
+#include "frontend/features/image_quality.h"
+#include "frontend/matching/pair_check.h"
 #include "frontend/tracking/frame.h"
 
 namespace hybrid_slam {
@@ -64,11 +67,29 @@ using SensorInput = std::variant<StereoImages, FisheyeImage, ExtractedFrame>;
 Nanoseconds time_of(const SensorInput& input);
 CameraKind camera_of(const SensorInput& input);
 
+// What is known of an input beside its features; see Diagnosis.
+struct FrameEvidence {
+  std::vector<ImageQuality> images;  // left and right, or the fisheye's; empty of features alone
+  double masked = 0;                 // share of the image that the input's own mask covers
+  std::optional<PairCheck> pair;     // of some stereo pairs
+  int late = 0;                      // inputs of this camera left out since the frame before
+  int dropped = 0;                   // likewise, for want of time
+};
+
+// An input that will not be tracked.
+struct LeftOut {
+  CameraKind camera = CameraKind::kStereo;
+  Nanoseconds time = 0;
+  const char* reason = "";  // kDropped, or why it was not taken: to_string(PushResult)
+};
+inline constexpr const char* kDropped = "dropped";
+
 // A frame of either camera, ready to be tracked.
 struct CameraFrame {
   CameraKind camera = CameraKind::kStereo;
   Nanoseconds time = 0;
   Frame frame;
+  FrameEvidence evidence{};
 };
 
 }  // namespace hybrid_slam

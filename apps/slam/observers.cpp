@@ -56,12 +56,22 @@ void Observers::loop(LoopRecord loop) {
 }
 
 void Observers::map(std::shared_ptr<const MapSnapshot> map, MapChange change) {
-  if (observers_.map) tell([this, map = std::move(map), change] { observers_.map(map, change); });
+  if (observers_.map) tell([this, map, change] { observers_.map(map, change); });
+  if (inner_.map && observers_.corrected) inner_.map(map, change);
 }
 
 void Observers::failure(SessionFailure failure) {
   if (!observers_.failure) return;
   tell([this, failure = std::move(failure)] { observers_.failure(failure); });
+}
+
+void Observers::left_out(const LeftOut& input) {
+  if (observers_.left_out) tell([this, input] { observers_.left_out(input); });
+}
+
+void Observers::corrected(std::vector<CorrectedPose> poses) {
+  if (poses.empty() || !observers_.corrected) return;
+  tell([this, poses = std::move(poses)] { observers_.corrected(poses); });
 }
 
 void Observers::finish() {

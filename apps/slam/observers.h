@@ -26,6 +26,8 @@ class Observers {
   void loop(LoopRecord loop);
   void map(std::shared_ptr<const MapSnapshot> map, MapChange change);
   void failure(SessionFailure failure);
+  void left_out(const LeftOut& input);
+  void corrected(std::vector<CorrectedPose> poses);
 
   // Tells what waits, then nothing any more.
   void finish();

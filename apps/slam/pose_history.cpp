@@ -11,7 +11,8 @@ void PoseHistory::add(const FrameResult& frame) {
   const KeyframeId reference = frame.tracked.reference;
   frames.push_back(
       {frame.time, frame.index, frame.has_pose(), reference,
-       reference.valid() ? frame.tracked.cam_from_reference : frame.tracked.cam_from_world});
+       reference.valid() ? frame.tracked.cam_from_reference : frame.tracked.cam_from_world,
+       frame.tracked.cam_from_world});
   if (frames.size() > size_) frames.pop_front();
 }
 
@@ -28,6 +29,23 @@ void PoseHistory::became_keyframe(const KeyframeResult& keyframe) {
 void PoseHistory::clear() {
   const std::lock_guard lock(mutex_);
   frames_.clear();
+}
+
+std::vector<CorrectedPose> PoseHistory::corrected(const MapSnapshot& map) {
+  const std::lock_guard lock(mutex_);
+  std::vector<CorrectedPose> moved;
+  for (auto& [camera, frames] : frames_) {
+    for (Entry& entry : frames) {
+      const auto now = pose(entry, map);
+      if (!now || (now->translation() == entry.told.translation() &&
+                   now->rotation().coeffs() == entry.told.rotation().coeffs())) {
+        continue;
+      }
+      entry.told = *now;
+      moved.push_back({camera, entry.time, *now});
+    }
+  }
+  return moved;
 }
 
 std::optional<Rigid3d> PoseHistory::pose(const Entry& entry, const MapSnapshot& map) {

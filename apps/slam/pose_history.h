@@ -5,6 +5,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 #include "apps/slam/session_types.h"
 
@@ -21,6 +22,9 @@ class PoseHistory {
   void became_keyframe(const KeyframeResult& keyframe);
   void clear();
 
+  // The frames that the map has elsewhere than it had them when they were last told.
+  std::vector<CorrectedPose> corrected(const MapSnapshot& map);
+
   // Pose at a time in the given map, cam_from_world: that of the frame, or between its two
   // neighbours (translation linear, rotation along the shortest arc). None outside of what is kept,
   // or where a neighbour has no pose.
@@ -33,6 +37,7 @@ class PoseHistory {
     bool has_pose = false;
     KeyframeId reference;  // invalid for the frame that starts the map: from the world
     Rigid3d cam_from_reference;
+    Rigid3d told;  // cam_from_world
   };
   static std::optional<Rigid3d> pose(const Entry& entry, const MapSnapshot& map);
 

@@ -5,6 +5,20 @@
 namespace hybrid_slam {
 namespace {
 
+constexpr const char* kCorrupt = "corrupt";
+
+RecordedFrame recorded(const TrackedFrame& frame) {
+  return {frame.frame_index,
+          frame.time,
+          frame.source,
+          frame.prediction,
+          frame.cam_from_world,
+          frame.reference,
+          frame.cam_from_reference,
+          frame.disparity_offset,
+          frame.shading};
+}
+
 double process_cpu_ms() {
   timespec used{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
@@ -23,24 +37,36 @@ Recorder::Recorder(RunResult& result, const ReplayHooks& hooks, std::size_t tota
   progress_.total = total;
 }
 
-void Recorder::corrupt(const std::string& reason) {
+void Recorder::corrupt(Nanoseconds time, const std::string& reason) {
   const std::lock_guard lock(mutex_);
   ++result_.frames.read;
   ++result_.frames.corrupt;
   warn(reason);
+  tell_left_out({CameraKind::kStereo, time, kCorrupt});
   report();
 }
 
-void Recorder::fisheye_missing(const std::string& reason) {
+void Recorder::fisheye_missing(Nanoseconds time, const std::string& reason) {
   const std::lock_guard lock(mutex_);
   ++result_.fisheye_frames.read;
   ++result_.fisheye_frames.corrupt;
   warn(reason);
+  tell_left_out({CameraKind::kFisheye, time, kCorrupt});
 }
 
-void Recorder::dropped_unread() {
+void Recorder::dropped_unread(Nanoseconds time) {
   const std::lock_guard lock(mutex_);
   ++result_.frames.dropped;
+  tell_left_out({CameraKind::kStereo, time, kDropped});
+}
+
+void Recorder::left_out(const LeftOut& input) {
+  const std::lock_guard lock(mutex_);
+  tell_left_out(input);
+}
+
+void Recorder::tell_left_out(const LeftOut& input) {
+  if (hooks_.left_out) hooks_.left_out(input);
 }
 
 void Recorder::failed(const SessionFailure& failure) {
@@ -61,7 +87,11 @@ void Recorder::tracked(const FrameResult& frame) {
   ++counts.read;
   ++(frame.has_pose() ? counts.tracked : counts.lost);
   record_of_frame_[{frame.camera, frame.index}] = records.size();
-  records.push_back({frame.tracked, std::nullopt, 0});
+  records.push_back({recorded(frame.tracked), std::nullopt, 0});
+  FrameConditions& conditions = stereo ? result_.conditions : result_.fisheye_conditions;
+  ++conditions.states[to_string(frame.state)];
+  for (const FoundCause& found : frame.causes) ++conditions.causes[to_string(found.cause)];
+  if (hooks_.frame) hooks_.frame(frame);
   progress_.keyframes = frame.keyframes;
   progress_.landmarks = frame.landmarks;
   if (!stereo) return;

@@ -14,9 +14,10 @@ class Recorder {
  public:
   Recorder(RunResult& result, const ReplayHooks& hooks, std::size_t total);
 
-  void corrupt(const std::string& reason);
-  void fisheye_missing(const std::string& reason);
-  void dropped_unread();
+  void corrupt(Nanoseconds time, const std::string& reason);
+  void fisheye_missing(Nanoseconds time, const std::string& reason);
+  void dropped_unread(Nanoseconds time);
+  void left_out(const LeftOut& input);
   void failed(const SessionFailure& failure);
   void tracked(const FrameResult& frame);
   void became_keyframe(const KeyframeResult& keyframe);
@@ -27,6 +28,7 @@ class Recorder {
   void warn(const std::string& text);
   void report();
   void add_cpu_time();
+  void tell_left_out(const LeftOut& input);
 
   RunResult& result_;
   const ReplayHooks& hooks_;

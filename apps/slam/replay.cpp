@@ -18,6 +18,7 @@ SessionObservers observers_of(Recorder& recorder) {
   observers.frame = [&](const FrameResult& frame) { recorder.tracked(frame); };
   observers.keyframe = [&](const KeyframeResult& keyframe) { recorder.became_keyframe(keyframe); };
   observers.loop = [&](const LoopRecord& loop) { recorder.looped(loop); };
+  observers.left_out = [&](const LeftOut& input) { recorder.left_out(input); };
   observers.failure = [&](const SessionFailure& failure) { recorder.failed(failure); };
   return observers;
 }
@@ -40,13 +41,14 @@ void push_all(const FrameSource& source, std::size_t total, double rate,
     const std::chrono::duration<double> age(rate > 0 ? static_cast<double>(i) / rate : 0);
     const auto due = start + std::chrono::duration_cast<Clock::duration>(age);
     if (rate > 0 && Clock::now() - due > std::chrono::duration<double>(2 / rate)) {
-      recorder.dropped_unread();
+      recorder.dropped_unread(source.time(i));
       continue;
     }
     Moment moment = source.read(i);
     if (rate > 0 && !wait_until(due, stop)) return;
-    if (!moment.error.empty()) recorder.corrupt(moment.error);
-    if (!moment.fisheye_error.empty()) recorder.fisheye_missing(moment.fisheye_error);
+    if (!moment.error.empty()) recorder.corrupt(source.time(i), moment.error);
+    if (!moment.fisheye_error.empty())
+      recorder.fisheye_missing(source.time(i), moment.fisheye_error);
     for (SensorInput& input : moment.inputs) {
       if (session.push(std::move(input)) == PushResult::kClosed) return;
     }

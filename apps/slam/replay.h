@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -26,6 +27,7 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
   virtual std::size_t size() const = 0;
+  virtual Nanoseconds time(std::size_t index) const = 0;
   virtual CameraRig cameras() const = 0;
   virtual Moment read(std::size_t index) const = 0;
 };
@@ -36,6 +38,9 @@ class ImageFrameSource final : public FrameSource {
   explicit ImageFrameSource(const ImageSequence& sequence) : sequence_(sequence) {}
 
   std::size_t size() const override { return sequence_.size(); }
+  Nanoseconds time(std::size_t index) const override {
+    return to_nanoseconds(sequence_.info().times[index]);
+  }
   CameraRig cameras() const override { return {sequence_.info().stereo, sequence_.info().fisheye}; }
   Moment read(std::size_t index) const override;
 
@@ -65,9 +70,24 @@ struct FrameCounts {
   int corrupt = 0;
 };
 
+// What of a TrackedFrame is needed after the run.
+struct RecordedFrame {
+  std::int64_t frame_index = 0;
+  double time = 0;  // [s]
+  PoseSource source = PoseSource::kNone;
+  Prediction prediction = Prediction::kNone;
+  Rigid3d cam_from_world;
+  KeyframeId reference;
+  Rigid3d cam_from_reference;
+  double disparity_offset = 0;
+  double shading = 0;
+
+  bool tracked() const { return source != PoseSource::kNone; }
+};
+
 // What stays of a tracked frame.
 struct FrameRecord {
-  TrackedFrame frame;                  // without its keyframe and counts
+  RecordedFrame frame;
   std::optional<KeyframeId> keyframe;  // the keyframe it became
   // Of a stereo frame: of the whole process, all its threads, from when the stereo frame before was
   // tracked [ms]. The first one's has the start of the run, the last one's the end.
@@ -83,12 +103,22 @@ struct ReplayProgress {
 };
 
 // What a replay needs from outside. When `cancelled` is requested, at any moment, the run ends in
-// order, with what it has. The two functions are called by one thread at a time, not always the
-// same.
+// order, with what it has. The functions are called by one thread at a time, not always the same.
 struct ReplayHooks {
+  std::function<void(const FrameResult&)> frame;        // of each camera, once it was tracked
+  std::function<void(const LeftOut&)> left_out;         // of each camera, if it never will be
   std::function<void(const ReplayProgress&)> progress;  // after each stereo frame
   std::function<void(const std::string&)> warning;      // one line each
   std::stop_token cancelled;
+};
+
+// How often what was seen, by its name.
+using NameCounts = std::map<std::string, int>;
+
+// What frames of one camera were like.
+struct FrameConditions {
+  NameCounts states;
+  NameCounts causes;
 };
 
 struct RunResult {
@@ -96,6 +126,8 @@ struct RunResult {
   std::vector<FrameRecord> records;  // every stereo frame that was tracked or lost, in order
   FrameCounts fisheye_frames;        // of those that came with a stereo frame that could be read
   std::vector<FrameRecord> fisheye_records;
+  FrameConditions conditions;
+  FrameConditions fisheye_conditions;
   std::shared_ptr<const MapSnapshot> map;
   std::vector<LoopRecord> loops;  // places proposed, in the order in which they were looked at
   std::optional<UpsamplingEvidence> upsampling;  // none where there were no images

@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <condition_variable>
 #include <mutex>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
 #include <utility>
 
 #include "apps/slam/pose_history.h"
+#include "apps/slam/session_log.h"
 #include "apps/slam/slam_core.h"
 #include "apps/slam/version.h"
 
@@ -43,7 +46,8 @@ class Session::Work {
         options_(options),
         session_(std::move(session)),
         history_(session_.history),
-        observers_(std::move(observers), session_.mode == SessionMode::kRealtime, inner()),
+        observers_(SessionLog::before(std::move(observers)),
+                   session_.mode == SessionMode::kRealtime, inner()),
         core_((require_valid(options), make_core(std::move(map)))),
         stream_(cameras, options, stream_options(session_)),
         thread_([this] { work(); }) {}
@@ -141,15 +145,17 @@ class Session::Work {
       if (awaited_ == std::pair(frame.camera, frame.time)) result_ = frame;
     };
     inner.keyframe = [this](const KeyframeResult& keyframe) { history_.became_keyframe(keyframe); };
+    inner.map = [this](const std::shared_ptr<const MapSnapshot>& map, MapChange change) {
+      if (change != MapChange::kKeyframe) observers_.corrected(history_.corrected(*map));
+    };
     return inner;
   }
 
   void work() {
     try {
-      while (auto frame = stream_.next()) {
-        begin_anew_if_asked();
-        core_->take(std::move(*frame));
-        stream_.done();
+      while (auto item = stream_.next()) {
+        for (const LeftOut& input : item->left_out) leave_out(input);
+        if (item->frame) take(std::move(*item->frame));
         changed_.notify_all();
       }
       core_->finish(is_cancelled());
@@ -162,6 +168,23 @@ class Session::Work {
     const std::lock_guard lock(mutex_);
     over_ = true;
     changed_.notify_all();
+  }
+
+  void leave_out(const LeftOut& input) {
+    FrameEvidence& since = since_[static_cast<std::size_t>(input.camera)];
+    since.late += input.reason == std::string_view(to_string(PushResult::kLate)) ? 1 : 0;
+    since.dropped += input.reason == std::string_view(kDropped) ? 1 : 0;
+    observers_.left_out(input);
+  }
+
+  void take(CameraFrame frame) {
+    begin_anew_if_asked();
+    const FrameEvidence since =
+        std::exchange(since_[static_cast<std::size_t>(frame.camera)], FrameEvidence());
+    frame.evidence.late = since.late;
+    frame.evidence.dropped = since.dropped;
+    core_->take(std::move(frame));
+    stream_.done();
   }
 
   void begin_anew_if_asked() {
@@ -203,7 +226,8 @@ class Session::Work {
   Observers observers_;
   std::unique_ptr<SlamCore> core_;  // the thread's own; others lock to read it, it to change it
   FrameStream stream_;
-  std::jthread thread_;  // last: joined before the rest goes
+  std::array<FrameEvidence, 2> since_;  // the last frame, by camera; the thread's own
+  std::jthread thread_;                 // last: joined before the rest goes
 };
 
 Session::Session(const CameraRig& cameras, const SlamOptions& options, SessionOptions session,

@@ -4,13 +4,17 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "apps/slam/diagnosis.h"
 #include "apps/slam/frame_stream.h"
 #include "apps/slam/inputs.h"
 #include "apps/slam/loop_closing.h"
 #include "backend/map/map_file.h"
 #include "backend/map/map_snapshot.h"
+#include "cameras/geometry/uncertain_motion.h"
 #include "frontend/place_recognition/default_vocabulary.h"
 #include "frontend/tracking/tracked_frame.h"
 
@@ -66,10 +70,15 @@ struct FrameResult {
   std::int64_t index = 0;  // of its moment in the map: frames of both cameras at one time share it
   TrackingState state = TrackingState::kStarting;
   TrackedFrame tracked;  // without its keyframe and counts
+  // Of a fisheye whose moment has a stereo pair, where both have poses: the fisheye's pose in the
+  // left camera, with all that both are off by in common taken out.
+  std::optional<UncertainMotion> left_from_fisheye;
+  std::vector<FoundCause> causes;  // what may be wrong, whether it was tracked or not
   int features = 0;
   int stereo_matches = 0;     // of them; 0 for a fisheye
   std::size_t keyframes = 0;  // in the map that it was tracked in
   std::size_t landmarks = 0;
+  bool mapping_behind = false;  // it could have become no keyframe: too many wait
 
   bool has_pose() const { return tracked.tracked(); }
 };
@@ -83,6 +92,15 @@ struct KeyframeResult {
 
 // Why there is another map.
 enum class MapChange { kKeyframe, kLoop, kFullBundle };
+
+const char* to_string(MapChange change);
+
+// The pose of a frame that was told before, as the map has it now.
+struct CorrectedPose {
+  CameraKind camera = CameraKind::kStereo;
+  Nanoseconds time = 0;
+  Rigid3d cam_from_world;
+};
 
 // Something went wrong and the session goes on.
 struct SessionFailure {
@@ -103,6 +121,9 @@ struct SessionObservers {
   std::function<void(const LoopRecord&)> loop;  // proposed, and what came of it
   std::function<void(const std::shared_ptr<const MapSnapshot>&, MapChange)> map;
   std::function<void(TrackingState from, TrackingState to)> state;  // of the stereo pair
+  // After a loop or the adjustment of everything: frames of SessionOptions::history that it moved.
+  std::function<void(std::span<const CorrectedPose>)> corrected;
+  std::function<void(const LeftOut&)> left_out;  // an input that will not be tracked
   std::function<void(const SessionFailure&)> failure;
 };
 

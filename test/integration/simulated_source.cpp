@@ -24,10 +24,13 @@ CameraRig SimulatedSource::cameras() const {
   return cameras;
 }
 
+Nanoseconds SimulatedSource::time(std::size_t index) const {
+  return to_nanoseconds(order.empty() ? stereo_truth(index).observations->time
+                                      : static_cast<double>(index) / scene_.options.frame_rate);
+}
+
 ExtractedFrame SimulatedSource::extracted(CameraKind camera, std::size_t index, Frame frame) const {
-  const double time =
-      order.empty() ? frame.time : static_cast<double>(index) / scene_.options.frame_rate;
-  return {to_nanoseconds(time), camera, std::move(frame)};
+  return {time(index), camera, std::move(frame)};
 }
 
 Moment SimulatedSource::read(std::size_t index) const {

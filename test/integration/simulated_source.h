@@ -19,6 +19,7 @@ class SimulatedSource final : public FrameSource {
     return order.empty() ? scene_.frames.size() / scene_.cameras.size() : order.size();
   }
   CameraRig cameras() const override;
+  Nanoseconds time(std::size_t index) const override;
   Moment read(std::size_t index) const override;
 
   // What is known of the frames of this index.

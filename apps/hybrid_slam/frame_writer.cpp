@@ -1,0 +1,148 @@
+#include "apps/hybrid_slam/frame_writer.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "apps/io/trajectory.h"
+#include "cameras/geometry/uncertain_motion.h"
+
+namespace hybrid_slam {
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr std::array kAxes = {"x", "y", "z", "rx", "ry", "rz"};
+
+// Columns of a pose, of the upper triangle of its covariance, and what they hold.
+std::string pose_columns(const std::string& prefix) {
+  std::string text;
+  for (const char* name : {"tx", "ty", "tz", "qx", "qy", "qz", "qw"}) text += "," + prefix + name;
+  return text;
+}
+
+std::string covariance_columns() {
+  std::string text;
+  for (std::size_t i = 0; i < kAxes.size(); ++i) {
+    for (std::size_t j = i; j < kAxes.size(); ++j) {
+      text += fmt::format(",cov_{}_{}", kAxes[i], kAxes[j]);
+    }
+  }
+  return text;
+}
+
+std::string values(const Rigid3d& pose) {
+  const auto& t = pose.translation();
+  Eigen::Vector4d q = pose.rotation().coeffs();
+  if (q.w() < 0) q = -q;
+  return fmt::format(",{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}", t.x(), t.y(), t.z(),
+                     q.x(), q.y(), q.z(), q.w());
+}
+
+std::string values(const Matrix6d& covariance) {
+  std::string text;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    for (Eigen::Index j = i; j < 6; ++j) text += fmt::format(",{:.6e}", covariance(i, j));
+  }
+  return text;
+}
+
+std::string commas(int count) { return std::string(static_cast<std::size_t>(count), ','); }
+
+constexpr int kPoseColumns = 7;
+constexpr int kCovarianceColumns = 21;
+
+std::string id_of(KeyframeId id) { return id.valid() ? fmt::format(",{}", id.value) : ","; }
+
+// "dark=13;few_features=0.02".
+std::string causes_of(const FrameResult& frame) {
+  std::string text;
+  for (const FoundCause& found : frame.causes) {
+    text +=
+        fmt::format("{}{}={:.4g}", text.empty() ? "" : ";", to_string(found.cause), found.value);
+  }
+  return text;
+}
+
+std::string header() {
+  return "camera,time,index,state,source,prediction,causes" + pose_columns("") +
+         ",sigma_position,sigma_rotation_deg,covariance_base,reference" +
+         pose_columns("reference_") +
+         ",features,stereo_matches,inliers,odometer_inliers,keyframes,landmarks" +
+         covariance_columns();
+}
+
+// The frame's pose in the map, how far off it may be, and the motion from its reference keyframe,
+// through which it follows what becomes of the map.
+std::string pose_values(const TrackedFrame& tracked, Matrix6d& covariance) {
+  const UncertainMotion world_from_cam =
+      inverse(UncertainMotion{tracked.cam_from_world, tracked.covariance});
+  covariance = ros_covariance(world_from_cam);
+  std::string text = values(world_from_cam.b_from_a);
+  text += fmt::format(",{:.6g},{:.6g}", std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
+                      kDegrees * std::sqrt(covariance.bottomRightCorner<3, 3>().trace()));
+  text += id_of(tracked.covariance_base) + id_of(tracked.reference);
+  return text + (tracked.reference.valid() ? values(inverse(tracked.cam_from_reference))
+                                           : commas(kPoseColumns));
+}
+
+std::string row(const FrameResult& frame) {
+  const TrackedFrame& tracked = frame.tracked;
+  std::string text =
+      fmt::format("{},{:.9f},{},{},{},{},{}", to_string(frame.camera), to_seconds(frame.time),
+                  frame.index, to_string(frame.state), to_string(tracked.source),
+                  to_string(tracked.prediction), causes_of(frame));
+  Matrix6d covariance = Matrix6d::Zero();
+  text +=
+      frame.has_pose() ? pose_values(tracked, covariance) : commas(kPoseColumns + 4 + kPoseColumns);
+  text += fmt::format(",{},{},{},{},{},{}", frame.features, frame.stereo_matches, tracked.inliers,
+                      tracked.odometer_inliers, frame.keyframes, frame.landmarks);
+  return text + (frame.has_pose() ? values(covariance) : commas(kCovarianceColumns));
+}
+
+}  // namespace
+
+FrameWriter::FrameWriter(const std::filesystem::path& folder, bool fisheye,
+                         std::function<void(const std::string&)> warn)
+    : warn_(std::move(warn)),
+      frames_(folder / "frames.csv"),
+      stereo_{LineFile(folder / "stereo_online.tum"), LineFile(folder / "stereo.tum")} {
+  append(frames_, header());
+  if (!fisheye) return;
+  fisheye_ = {LineFile(folder / "fisheye_online.tum"), LineFile(folder / "fisheye.tum")};
+  fisheye_in_left_ = LineFile(folder / "fisheye_in_left.csv");
+  append(fisheye_in_left_, "time" + pose_columns("") + covariance_columns());
+}
+
+void FrameWriter::append(LineFile& file, const std::string& line) {
+  const std::string failure = file.append(line);
+  if (!failure.empty() && warn_) warn_(failure);
+}
+
+void FrameWriter::frame(const FrameResult& frame) {
+  append(frames_, row(frame));
+  if (frame.has_pose()) {
+    write_pose(frame.camera == CameraKind::kStereo ? stereo_ : fisheye_, frame);
+  }
+  if (frame.left_from_fisheye) {
+    append(fisheye_in_left_, fmt::format("{:.9f}", to_seconds(frame.time)) +
+                                 values(frame.left_from_fisheye->b_from_a) +
+                                 values(ros_covariance(*frame.left_from_fisheye)));
+  }
+}
+
+void FrameWriter::write_pose(Trajectory& files, const FrameResult& frame) {
+  const std::string line = tum_line({frame.tracked.time, inverse(frame.tracked.cam_from_world)});
+  append(files.online, line);
+  append(files.estimate, line);
+}
+
+void FrameWriter::left_out(const LeftOut& input) {
+  append(frames_, fmt::format("{},{:.9f},,{},,,", to_string(input.camera), to_seconds(input.time),
+                              input.reason) +
+                      commas(kPoseColumns + 4 + kPoseColumns + 6 + kCovarianceColumns));
+}
+
+}  // namespace hybrid_slam
