@@ -26,7 +26,8 @@ class FrameTracking {
   std::optional<MappingJob> track(CameraFrame frame, const MapSnapshot& map,
                                   bool allow_keyframe = true);
 
-  // The words of the map's keyframes, which follow it: for use in the same thread.
+  // The words of the map's keyframes, which follow it: for use in the same thread. Who has found
+  // them already assigns them before track(), which else does it.
   std::shared_ptr<KeyframeDatabase> places() const { return places_; }
 
  private:

@@ -5,10 +5,14 @@
 
 namespace hybrid_slam {
 
-LoopWorker::LoopWorker(LoopClosing& closing, MappingWorker& mapping)
-    : closing_(closing), mapping_(mapping), keyframes_(kBacklog), outcomes_(1), thread_([this] {
-        work();
-      }) {}
+LoopWorker::LoopWorker(LoopClosing& closing, MappingWorker& mapping,
+                       std::shared_ptr<KeyframeDatabase> places)
+    : closing_(closing),
+      mapping_(mapping),
+      places_(std::move(places)),
+      keyframes_(kBacklog),
+      outcomes_(1),
+      thread_([this] { work(); }) {}
 
 void LoopWorker::finish() {
   stop_.request_stop();
@@ -43,7 +47,9 @@ void LoopWorker::work() {
 
 // False if nobody closes loops any more.
 bool LoopWorker::look_at(KeyframeId id) {
-  loop_ = closing_.find(*mapping_.snapshot(), id, times_);
+  const auto newest = mapping_.published();
+  *places_ = newest->places;
+  loop_ = closing_.find(*newest->map, id, times_);
   if (!loop_) {
     return true;
   }

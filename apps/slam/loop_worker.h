@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -15,7 +16,9 @@ namespace hybrid_slam {
 // mapping, one at a time.
 class LoopWorker {
  public:
-  LoopWorker(LoopClosing& closing, MappingWorker& mapping);
+  // `places`: those that `closing` looks into; they get the words that mapping has found.
+  LoopWorker(LoopClosing& closing, MappingWorker& mapping,
+             std::shared_ptr<KeyframeDatabase> places);
   ~LoopWorker() { finish(); }
 
   // A keyframe is in the map. Never waits: where too many wait already, its loops are not looked
@@ -44,6 +47,7 @@ class LoopWorker {
 
   LoopClosing& closing_;
   MappingWorker& mapping_;
+  std::shared_ptr<KeyframeDatabase> places_;  // the thread's own until finish()
   Channel<KeyframeId> keyframes_;
   Channel<LoopOutcome> outcomes_;
   StageTimes times_;                     // the thread's own until finish()

@@ -4,10 +4,20 @@
 
 namespace hybrid_slam {
 
-MappingWorker::MappingWorker(LocalMapping& mapping, MappingEvents events)
-    : mapping_(mapping), events_(std::move(events)), tasks_(kKeyframeBacklog + kOthers) {
+MappingWorker::MappingWorker(LocalMapping& mapping, const Vocabulary& vocabulary,
+                             MappingEvents events)
+    : mapping_(mapping),
+      events_(std::move(events)),
+      tasks_(kKeyframeBacklog + kOthers),
+      places_(vocabulary) {
   publish();
   thread_ = std::jthread([this] { work(); });
+}
+
+void MappingWorker::publish() {
+  auto map = reaper_.adopt(mapping_.snapshot());
+  places_.follow(*map);
+  snapshots_.publish(reaper_.adopt(std::make_shared<const PublishedMap>(std::move(map), places_)));
 }
 
 void MappingWorker::hurry() {
@@ -47,19 +57,19 @@ void MappingWorker::run(MappingJob& job) {
     current_ = stop;
   }
   const KeyframeId id = mapping_.process(job, times_, stop.get_token(), [this] { publish(); });
-  events_.mapped({job.camera, job.frame_index(), id}, snapshots_.get());
+  events_.mapped({job.camera, job.frame_index(), id}, snapshot());
 }
 
 void MappingWorker::run(LoopMeasurement& loop) {
   const LoopOutcome outcome = mapping_.close(loop, times_, [this] { publish(); });
-  events_.looped(outcome, snapshots_.get(), mapping_.closings());
+  events_.looped(outcome, snapshot(), mapping_.closings());
 }
 
 void MappingWorker::run(FullCorrection& correction) {
   mapping_.take_in_full(std::move(correction.result), correction.loops_closed, times_,
                         [this] { publish(); });
   loops_adjusted_ = correction.loops_closed;
-  events_.adjusted(snapshots_.get());
+  events_.adjusted(snapshot());
 }
 
 }  // namespace hybrid_slam

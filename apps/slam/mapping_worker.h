@@ -10,7 +10,9 @@
 
 #include "apps/slam/channel.h"
 #include "apps/slam/local_mapping.h"
+#include "apps/slam/reaper.h"
 #include "apps/slam/session_types.h"
+#include "frontend/place_recognition/keyframe_database.h"
 
 namespace hybrid_slam {
 
@@ -30,11 +32,17 @@ struct MappingEvents {
   std::function<void(const std::shared_ptr<const MapSnapshot>&)> adjusted;  // all of it
 };
 
+// A map and, found once for all who recognise places, the words of its keyframes.
+struct PublishedMap {
+  std::shared_ptr<const MapSnapshot> map;
+  KeyframeDatabase places;
+};
+
 // The map's owner in a thread of its own. Keyframes, loops and corrections go in, snapshots come
 // out.
 class MappingWorker {
  public:
-  MappingWorker(LocalMapping& mapping, MappingEvents events);
+  MappingWorker(LocalMapping& mapping, const Vocabulary& vocabulary, MappingEvents events);
   ~MappingWorker() { finish(); }
 
   // Whether a keyframe would not have to wait. From the one thread that adds keyframes.
@@ -53,7 +61,9 @@ class MappingWorker {
   // Until the worker has begun with the last task it was given.
   void wait_until_taken() { tasks_.wait_empty(); }
 
-  std::shared_ptr<const MapSnapshot> snapshot() const { return snapshots_.get(); }
+  // The newest map, and with it the words of its keyframes.
+  std::shared_ptr<const MapSnapshot> snapshot() const { return published()->map; }
+  std::shared_ptr<const PublishedMap> published() const { return snapshots_.get(); }
 
   // Until the map has begun, there is nothing to track against.
   void wait_for_map(std::size_t version) const { snapshots_.next(version); }
@@ -63,7 +73,7 @@ class MappingWorker {
   void finish();
 
   // The map as it is. After finish(), for who went on with it.
-  void publish() { snapshots_.publish(mapping_.snapshot()); }
+  void publish();
 
   // After finish(): what the thread threw, if it did.
   void rethrow() const;
@@ -86,7 +96,9 @@ class MappingWorker {
   LocalMapping& mapping_;
   MappingEvents events_;
   Channel<std::variant<MappingJob, LoopMeasurement, FullCorrection>> tasks_;
-  Latest<MapSnapshot> snapshots_;
+  Reaper reaper_;  // of snapshots that nobody holds any more
+  KeyframeDatabase places_;
+  Latest<PublishedMap> snapshots_;
   std::mutex mutex_;
   std::stop_source current_;        // guarded by mutex_
   StageTimes times_;                // the thread's own until finish()

@@ -23,13 +23,12 @@ class RealtimeCore final : public SlamCore {
                   set_up.session.localize, local_mapping_, observers_, times_),
         checkpoints_(set_up.checkpoint, set_up.session.checkpoint_every,
                      [this](const SessionFailure& failure) { observers_.failure(failure); }),
-        mapping_(local_mapping_, events()) {
+        mapping_(local_mapping_, set_up.session.vocabulary, events()) {
     if (!set_up.options.loops.enabled || set_up.session.localize) return;
-    // Its own words: tracking has others, in another thread.
-    loop_closing_.emplace(std::make_shared<KeyframeDatabase>(set_up.session.vocabulary),
-                          set_up.options.loops.finder,
+    const auto places = std::make_shared<KeyframeDatabase>(set_up.session.vocabulary);
+    loop_closing_.emplace(places, set_up.options.loops.finder,
                           [this](const LoopRecord& loop) { observers_.loop(loop); });
-    loops_.emplace(*loop_closing_, mapping_);
+    loops_.emplace(*loop_closing_, mapping_, places);
     full_bundle_.emplace(set_up.options.backend.full, mapping_);
   }
   ~RealtimeCore() override { join(true); }
@@ -38,7 +37,10 @@ class RealtimeCore final : public SlamCore {
   // mapping, so that tracking is never more than one keyframe of each camera ahead.
   void take(CameraFrame frame) override {
     if (!paced_ && frame.camera == CameraKind::kStereo) mapping_.wait_until_taken();
-    auto job = tracking_.track(std::move(frame), *map(), mapping_.has_room());
+    const auto newest = mapping_.published();
+    if (newest != seen_) *tracking_.places() = newest->places;
+    seen_ = newest;
+    auto job = tracking_.track(std::move(frame), *newest->map, mapping_.has_room());
     if (job) add_keyframe(std::move(*job));
   }
 
@@ -142,6 +144,7 @@ class RealtimeCore final : public SlamCore {
   CheckpointWorker checkpoints_;
   std::optional<LoopClosing> loop_closing_;
   MappingWorker mapping_;
+  std::shared_ptr<const PublishedMap> seen_;  // by tracking
   std::optional<LoopWorker> loops_;
   std::optional<FullBundleWorker> full_bundle_;
 };

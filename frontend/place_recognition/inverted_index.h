@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -17,22 +18,21 @@ struct SimilarKeyframe {
 };
 
 // Which keyframes contain a word: finds those that look like an image without a glance at the
-// others. For images of one vocabulary.
+// others. For images of one vocabulary. Cheap to copy: a copy shares what is in it and does not see
+// later changes, so that other threads can go on with it.
 class InvertedIndex {
  public:
-  explicit InvertedIndex(const Vocabulary& vocabulary) : postings_(vocabulary.tables().nodes()) {}
-
   // Throws std::logic_error if the keyframe is there already.
-  void add(KeyframeId keyframe, const BowVector& bow);
+  void add(KeyframeId keyframe, BowVector bow);
 
   // No matter if it is not there.
   void remove(KeyframeId keyframe);
 
-  bool contains(KeyframeId keyframe) const { return slot_of_.contains(keyframe); }
-  std::size_t size() const { return slot_of_.size(); }
+  bool contains(KeyframeId keyframe) const { return segment_of_.contains(keyframe); }
+  std::size_t size() const { return segment_of_.size(); }
 
   // What was added. Throws std::out_of_range if it is not there. Valid until the next change.
-  const BowVector& bow(KeyframeId keyframe) const { return slots_[slot_of_.at(keyframe)].bow; }
+  const BowVector& bow(KeyframeId keyframe) const;
 
   // The keyframes that share a word with the image, best first, of equal ones that of the lower id;
   // without those in `excluded`, which come in any order.
@@ -44,15 +44,26 @@ class InvertedIndex {
     std::uint32_t slot;
     float weight;
   };
-  struct Slot {
-    KeyframeId keyframe;  // invalid if free
-    BowVector bow;
-  };
+  // Some keyframes and, by word, which of them contain it. Does not change; a change makes another
+  // one, in a time that goes with its size.
+  struct Segment {
+    std::vector<KeyframeId> keyframes;
+    std::vector<std::shared_ptr<const BowVector>> bows;
+    std::vector<NodeId> words;         // ascending
+    std::vector<std::uint32_t> begin;  // of each word's postings, and of what would be the next's
+    std::vector<Posting> postings;
 
-  std::vector<std::vector<Posting>> postings_;  // one list per node
-  std::vector<Slot> slots_;
-  std::vector<std::uint32_t> free_slots_;
-  std::map<KeyframeId, std::uint32_t> slot_of_;
+    Segment with(KeyframeId keyframe, std::shared_ptr<const BowVector> bow) const;
+    Segment without(std::uint32_t slot) const;
+    void query(const BowVector& bow, std::span<SimilarKeyframe> by_slot) const;
+    std::uint32_t slot_of(KeyframeId keyframe) const;
+  };
+  static constexpr std::size_t kSegment = 64;  // keyframes in one, at most
+
+  // By the number of the segment: full ones, whose keyframes come and go no more but to be removed,
+  // and the newest.
+  std::map<std::uint32_t, std::shared_ptr<const Segment>> segments_;
+  std::map<KeyframeId, std::uint32_t> segment_of_;
 };
 
 }  // namespace hybrid_slam

@@ -5,8 +5,7 @@
 
 namespace hybrid_slam {
 
-KeyframeDatabase::KeyframeDatabase(Vocabulary vocabulary)
-    : vocabulary_(std::move(vocabulary)), inverted_(vocabulary_) {}
+KeyframeDatabase::KeyframeDatabase(Vocabulary vocabulary) : vocabulary_(std::move(vocabulary)) {}
 
 void KeyframeDatabase::follow(const MapSnapshot& map) {
   const std::vector<KeyframeId> born = map.keyframe_ids_from(next_);

@@ -10,7 +10,7 @@
 namespace hybrid_slam {
 
 // The keyframes of a map by what the vocabulary says about them: those of either camera that look
-// like an image. One thread at a time.
+// like an image. One thread at a time; cheap to copy, for others.
 class KeyframeDatabase {
  public:
   explicit KeyframeDatabase(Vocabulary vocabulary);

@@ -72,7 +72,7 @@ TEST_CASE("The inverted index finds the keyframes that comparing all would find"
   const Vocabulary vocabulary = small_vocabulary();
   const auto nodes = static_cast<NodeId>(vocabulary.tables().nodes());
   Random random(5);
-  InvertedIndex index(vocabulary);
+  InvertedIndex index;
   std::map<KeyframeId, BowVector> keyframes;
   for (std::uint32_t i = 0; i < 200; ++i) {
     keyframes[KeyframeId(i)] = random_bow(nodes, random);
@@ -112,7 +112,7 @@ TEST_CASE("The inverted index finds the keyframes that comparing all would find"
 
 TEST_CASE("Keyframes of equal score come by their ids; each is added once") {
   const Vocabulary vocabulary = small_vocabulary();
-  InvertedIndex index(vocabulary);
+  InvertedIndex index;
   const BowVector bow{{30, 1.0F}};
   for (const std::uint32_t id : {7U, 2U, 5U}) index.add(KeyframeId(id), bow);
   const auto hits = index.query(bow, {});

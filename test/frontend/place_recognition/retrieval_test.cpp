@@ -87,7 +87,7 @@ TEST_CASE("Changed copies of real images are found among all of them", "[slow]")
   }
   const auto sift = make_sift({.max_features = 1000});
   const Vocabulary vocabulary = default_vocabulary();
-  InvertedIndex index(vocabulary);
+  InvertedIndex index;
   std::vector<cv::Mat> images;
   for (const std::string& path : images_below(std::string(data) + "/underwater_images", kImages)) {
     const auto id = static_cast<std::uint32_t>(images.size());
