@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "backend/map/components.h"
 #include "backend/map/dropped_features.h"
 #include "backend/problem/loop_correction.h"
 #include "backend/problem/solve_bundle.h"
@@ -134,6 +135,7 @@ LoopOutcome Backend::close(const LoopMeasurement& loop) {
   LoopOutcome outcome;
   if (view().find(loop.keyframe) == nullptr || view().find(loop.match) == nullptr) return outcome;
   write_discrepancy(view(), loop, outcome);
+  bring_together(loop);
   refused_.push_back(by_present_keypoints(view(), loop));  // until it is taken
   LoopClosureOptions options = options_.loops;
   for (const LoopMeasurement& one : refused_) options.graph.with_scale |= one.with_scale;
@@ -163,14 +165,46 @@ void Backend::take_in(const LoopClosure& closure, const LoopGraphOptions& option
   for (auto i = closure.taken.rbegin(); i != closure.taken.rend(); ++i) {
     refused_.erase(refused_.begin() + static_cast<std::ptrdiff_t>(*i));
   }
-  moves_.push_back(move_of(view(), closure.correction));
-  if (options.with_scale) {
-    forget_moves(moves_.size());  // motions between neighbours have another size now
-  } else if (moves_.size() > kMaxMoves) {
-    forget_moves(1);
-  }
-  map_.move(closure.correction.cam_from_world, closure.correction.point_in_world);
+  move(closure.correction);
+  if (options.with_scale) forget_moves(moves_.size());  // motions have another size now
   for (const LoopMeasurement& loop : taken) merge_sides(loop);
+}
+
+void Backend::move(const BundleResult& correction) {
+  moves_.push_back(move_of(view(), correction));
+  if (moves_.size() > kMaxMoves) forget_moves(1);
+  map_.move(correction.cam_from_world, correction.point_in_world);
+}
+
+// Where the loop's ends lie in different components, only it says where these lie against one
+// another: one of them moves as a whole.
+void Backend::bring_together(const LoopMeasurement& loop) {
+  const KeyframeId newer_part = view().at(loop.keyframe).component;
+  const KeyframeId older_part = view().at(loop.match).component;
+  if (newer_part == older_part) return;
+  const KeyframeId origins = view().at(view().origin()).component;
+  const auto sizes = component_sizes(view());
+  const bool newer_moves = older_part == origins ||
+                           (newer_part != origins && sizes.at(newer_part) <= sizes.at(older_part));
+  const Rigid3d newer_from_older = without_scale(loop.keyframe_from_match);
+  const Rigid3d newer = view().at(loop.keyframe).cam_from_world;
+  const Rigid3d older = view().at(loop.match).cam_from_world;
+  const Rigid3d old_from_new_world = newer_moves
+                                         ? inverse(newer) * newer_from_older * older
+                                         : inverse(older) * inverse(newer_from_older) * newer;
+  const Rigid3d new_from_old_world = inverse(old_from_new_world);
+  const KeyframeId goes = newer_moves ? newer_part : older_part;
+  BundleResult correction;
+  for (const KeyframeId id : view().keyframe_ids()) {
+    if (view().at(id).component != goes) continue;
+    correction.cam_from_world.emplace_back(id, view().at(id).cam_from_world * old_from_new_world);
+  }
+  for (const LandmarkId id : view().landmark_ids()) {
+    const Landmark& landmark = view().at(id);
+    if (view().at(landmark.observations.front().keyframe).component != goes) continue;
+    correction.point_in_world.emplace_back(id, new_from_old_world * landmark.point_in_world);
+  }
+  move(correction);
 }
 
 void Backend::merge_sides(const LoopMeasurement& loop) {
@@ -180,6 +214,7 @@ void Backend::merge_sides(const LoopMeasurement& loop) {
   map_.apply(edit);
   map_.set_keep(loop.keyframe);
   map_.set_keep(loop.match);
+  map_.join_components(loop.keyframe, loop.match);
 }
 
 BundleResult solve_full(const MapSnapshot& map, const FullBundleOptions& options,

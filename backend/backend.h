@@ -69,9 +69,10 @@ class Backend {
   // when stopped.
   BundleSummary optimize_local(KeyframeId newest, std::stop_token stop = {});
 
-  // Closes a loop: the loop graph moves every keyframe, landmarks follow, those of the two sides
-  // that are the same are merged. A loop that is not believed changes nothing, but is remembered: a
-  // later one may agree with it.
+  // Closes a loop. One between two components first brings the one without the origin, or the
+  // smaller one, to where the loop sees it. Then the loop graph moves every keyframe, landmarks
+  // follow, those of the two sides that are the same are merged. A loop that is not believed
+  // changes nothing, but is remembered: a later one may agree with it.
   LoopOutcome close(const LoopMeasurement& loop);
 
   // How often close() has moved the map.
@@ -94,6 +95,8 @@ class Backend {
  private:
   BundleSummary take_in(BundleResult result);
   void take_in(const LoopClosure& closure, const LoopGraphOptions& options);
+  void move(const BundleResult& correction);
+  void bring_together(const LoopMeasurement& loop);
   void merge_sides(const LoopMeasurement& loop);
   MapSmoother& smoother();
   void moved_by_others(bool cameras_too);

@@ -71,7 +71,7 @@ std::string header() {
          ",sigma_position,sigma_rotation_deg,covariance_base,reference" +
          pose_columns("reference_") +
          ",features,stereo_matches,inliers,odometer_inliers,keyframes,landmarks" +
-         covariance_columns();
+         covariance_columns() + ",component";
 }
 
 // The frame's pose in the map, how far off it may be, and the motion from its reference keyframe,
@@ -99,7 +99,8 @@ std::string row(const FrameResult& frame) {
       frame.has_pose() ? pose_values(tracked, covariance) : commas(kPoseColumns + 4 + kPoseColumns);
   text += fmt::format(",{},{},{},{},{},{}", frame.features, frame.stereo_matches, tracked.inliers,
                       tracked.odometer_inliers, frame.keyframes, frame.landmarks);
-  return text + (frame.has_pose() ? values(covariance) : commas(kCovarianceColumns));
+  return text + (frame.has_pose() ? values(covariance) : commas(kCovarianceColumns)) +
+         id_of(frame.component);
 }
 
 }  // namespace
@@ -142,7 +143,7 @@ void FrameWriter::write_pose(Trajectory& files, const FrameResult& frame) {
 void FrameWriter::left_out(const LeftOut& input) {
   append(frames_, fmt::format("{},{:.9f},,{},,,", to_string(input.camera), to_seconds(input.time),
                               input.reason) +
-                      commas(kPoseColumns + 4 + kPoseColumns + 6 + kCovarianceColumns));
+                      commas(kPoseColumns + 4 + kPoseColumns + 6 + kCovarianceColumns + 1));
 }
 
 }  // namespace hybrid_slam

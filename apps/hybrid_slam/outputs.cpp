@@ -29,8 +29,10 @@ Trajectories collect(const RunResult& result, const std::vector<FrameRecord>& re
   Trajectories trajectories;
   for (const FrameRecord& record : records) {
     if (record.frame.tracked()) {
-      trajectories.final_estimate.push_back(
-          {record.frame.time, inverse(result.cam_from_world(record))});
+      if (record.in_main) {
+        trajectories.final_estimate.push_back(
+            {record.frame.time, inverse(result.cam_from_world(record))});
+      }
       trajectories.online.push_back({record.frame.time, inverse(record.frame.cam_from_world)});
     }
   }
@@ -147,6 +149,7 @@ Json fisheye_json(const RunResult& result, const RunSummary& summary) {
   Json json;
   json["frames"] = {{"read", frames.read},
                     {"registered", frames.tracked},
+                    {"other_components", frames.other_components},
                     {"lost", frames.lost},
                     {"missing", frames.corrupt}};
   json["poses_from"] = count_by(result.fisheye_records,
@@ -173,6 +176,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   json["layout"] = sequence.layout;
   json["frames"] = {{"read", frames.read},
                     {"tracked", frames.tracked},
+                    {"other_components", frames.other_components},
                     {"lost", frames.lost},
                     {"dropped", frames.dropped},
                     {"corrupt", frames.corrupt}};
@@ -183,6 +187,7 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   add_conditions(json, result.conditions);
   json["keyframes"] = result.map->keyframe_count();
   json["landmarks"] = result.map->landmark_count();
+  json["components"] = result.components;
   json["loops"] = to_json(result.loops);
   if (sequence.fisheye) json["fisheye"] = fisheye_json(result, summary);
   json["disparity_offset_px"] =
@@ -257,6 +262,10 @@ void print_summary(const CommandLine& line, const RunResult& result, const RunSu
   }
   fmt::print("map        {} keyframes, {} landmarks\n", result.map->keyframe_count(),
              result.map->landmark_count());
+  if (result.components > 1) {
+    fmt::print("components {}; {} frames have poses in others than the one with most\n",
+               result.components, frames.other_components);
+  }
   if (!result.loops.empty()) {
     const Json loops = to_json(result.loops);
     fmt::print("loops      {} places proposed, {} closed\n", loops["proposed"].get<int>(),

@@ -28,6 +28,7 @@ StereoTrackerOptions stereo_options(const CameraRig& cameras, const SlamOptions&
 TrackingState state_of(const TrackedFrame& tracked, const MapSnapshot& map) {
   switch (tracked.source) {
     case PoseSource::kInitialization:
+      return map.origin().valid() ? TrackingState::kStarting : TrackingState::kMap;
     case PoseSource::kLocalMap:
       return TrackingState::kMap;
     case PoseSource::kOdometer:
@@ -111,6 +112,11 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
     if (tracked.tracked()) result.left_from_fisheye = left_from_fisheye(map);
   } else if (const auto cause = Diagnosis::look_at_offset(tracked.disparity_offset)) {
     result.causes.push_back(*cause);
+  }
+  const Keyframe* const reference_of_frame = map.find(tracked.reference);
+  const bool begins = tracked.source == PoseSource::kInitialization;
+  if (tracked.tracked() && reference_of_frame != nullptr && !begins) {
+    result.component = reference_of_frame->component;
   }
   auto keyframe = std::exchange(tracked.keyframe, std::nullopt);
   tracked.counts = {};

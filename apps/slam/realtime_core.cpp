@@ -7,6 +7,7 @@
 #include "apps/slam/loop_worker.h"
 #include "apps/slam/mapping_worker.h"
 #include "apps/slam/slam_core.h"
+#include "backend/map/odometry.h"
 
 namespace hybrid_slam {
 namespace {
@@ -69,11 +70,12 @@ class RealtimeCore final : public SlamCore {
   }
 
  private:
-  // Where time presses, the keyframe before is cut short. The first one starts the map, without
-  // which there is nothing to track against.
+  // Where time presses, the keyframe before is cut short. The first one of the map, or of a
+  // component, is what there is to track against.
   void add_keyframe(MappingJob job) {
     if (paced_) mapping_.hurry();
-    const bool first = !map()->origin().valid();
+    const auto& odometry = job.keyframe.odometry;
+    const bool first = !map()->origin().valid() || (odometry != nullptr && is_loose(*odometry));
     const std::size_t version = mapping_.version();
     if (!mapping_.add(std::move(job))) {  // its thread has failed
       mapping_.finish();

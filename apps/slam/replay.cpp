@@ -1,11 +1,13 @@
 #include "apps/slam/replay.h"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <utility>
 
 #include "apps/slam/recorder.h"
+#include "backend/map/components.h"
 #include "cameras/files/input_error.h"
 
 namespace hybrid_slam {
@@ -55,6 +57,34 @@ void push_all(const FrameSource& source, std::size_t total, double rate,
   }
 }
 
+KeyframeId component_of(const RunResult& result, const FrameRecord& record) {
+  const KeyframeId id = record.keyframe.value_or(record.frame.reference);
+  return id.valid() ? result.map->component(id) : KeyframeId();
+}
+
+// Frames whose component is not the one that holds most of them have poses of another world.
+void settle_components(RunResult& result) {
+  result.components = component_sizes(*result.map).size();
+  std::map<KeyframeId, int> frames;
+  for (const FrameRecord& record : result.records) {
+    if (record.frame.tracked()) ++frames[component_of(result, record)];
+  }
+  const auto most =
+      std::max_element(frames.begin(), frames.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most == frames.end()) return;
+  const auto settle = [&](std::vector<FrameRecord>& records, FrameCounts& counts) {
+    for (FrameRecord& record : records) {
+      record.in_main = record.frame.tracked() && component_of(result, record) == most->first;
+      if (!record.frame.tracked() || record.in_main) continue;
+      --counts.tracked;
+      ++counts.other_components;
+    }
+  };
+  settle(result.records, result.frames);
+  settle(result.fisheye_records, result.fisheye_frames);
+}
+
 }  // namespace
 
 Moment ImageFrameSource::read(std::size_t index) const {
@@ -88,6 +118,7 @@ RunResult replay(const FrameSource& source, const SlamOptions& options, ReplayOp
   }
   recorder.finish(session.counts(), hooks.cancelled.stop_requested());
   result.map = session.map();
+  settle_components(result);
   result.times = session.times();
   result.upsampling = session.upsampling();
   result.upsampled = session.upsamples();

@@ -63,9 +63,10 @@ struct ReplayOptions {
 };
 
 struct FrameCounts {
-  int read = 0;  // handed to the session, corrupt ones included
-  int tracked = 0;
-  int lost = 0;  // the map not yet begun included
+  int read = 0;              // handed to the session, corrupt ones included
+  int tracked = 0;           // in the component that holds most of the frames at the end
+  int other_components = 0;  // in others
+  int lost = 0;              // the map not yet begun included
   int dropped = 0;
   int corrupt = 0;
 };
@@ -92,6 +93,7 @@ struct FrameRecord {
   // Of a stereo frame: of the whole process, all its threads, from when the stereo frame before was
   // tracked [ms]. The first one's has the start of the run, the last one's the end.
   double cpu_ms = 0;
+  bool in_main = true;  // it has a pose in the component that holds most of the frames at the end
 };
 
 struct ReplayProgress {
@@ -129,6 +131,7 @@ struct RunResult {
   FrameConditions conditions;
   FrameConditions fisheye_conditions;
   std::shared_ptr<const MapSnapshot> map;
+  std::size_t components = 0;     // of the map
   std::vector<LoopRecord> loops;  // places proposed, in the order in which they were looked at
   std::optional<UpsamplingEvidence> upsampling;  // none where there were no images
   bool upsampled = false;

@@ -54,7 +54,7 @@ struct SessionOptions {
 
 // What a pose rests on.
 enum class TrackingState {
-  kStarting,     // there is no map yet
+  kStarting,     // there is no map yet, or a component of it begins
   kMap,          // landmarks of the map
   kOdometry,     // the motion since a frame that the map held
   kRelocalised,  // found again in the map, by its looks
@@ -78,6 +78,8 @@ struct FrameResult {
   int stereo_matches = 0;     // of them; 0 for a fisheye
   std::size_t keyframes = 0;  // in the map that it was tracked in
   std::size_t landmarks = 0;
+  // Of the map, that it has a pose in; invalid without one, and of the frame that begins one.
+  KeyframeId component;
   bool mapping_behind = false;  // it could have become no keyframe: too many wait
 
   bool has_pose() const { return tracked.tracked(); }

@@ -202,7 +202,8 @@ void fields_of(S section, StereoTrackerOptions& options) {
   fields_of(section.section("odometer"), options.odometer);
   fields_of(section.section("disparity"), options.disparity);
   fields_of(section.section("shading"), options.refinement.shading);
-  section.field("min_initial_share", options.min_initial_share)
+  section.field("new_components", options.new_components)
+      .field("min_initial_share", options.min_initial_share)
       .field("close_baselines", options.close_baselines)
       .field("min_new_points", options.min_new_points)
       .field("last_frame_radius", options.last_frame_radius)

@@ -30,6 +30,9 @@ struct Keyframe {
   std::vector<KeyframeId> children;          // ascending
   bool keep = false;                         // exempt from culling (origin, ends of loops)
   std::shared_ptr<const Odometry> odometry;  // from the keyframe before; null where there is none
+  // Which component of the map it is part of: by the keyframe that this began with; see
+  // components.h.
+  KeyframeId component;
 };
 
 }  // namespace hybrid_slam

@@ -103,7 +103,24 @@ KeyframeId Map::add_keyframe(const NewKeyframe& made) {
   transaction.commit();
   if (id != tables.origin) attach_to_tree(tables, id, made.reference);
   attach_odometry(tables, id, made.odometry);
+  Keyframe& added = tables.keyframes.edit(id.value);
+  const bool begins = id == tables.origin || (added.odometry != nullptr &&
+                                              is_loose(*added.odometry) && added.covisible.empty());
+  added.component = begins ? id : tables.keyframes.find(added.parent.value)->component;
+  added.keep = added.keep || begins;
   return id;
+}
+
+void Map::join_components(KeyframeId a, KeyframeId b) {
+  MapTables& tables = view_.tables_;
+  const Keyframe* const one = tables.keyframes.find(a.value);
+  const Keyframe* const other = tables.keyframes.find(b.value);
+  if (one == nullptr || other == nullptr || one->component == other->component) return;
+  const KeyframeId stays = std::min(one->component, other->component);
+  const KeyframeId goes = std::max(one->component, other->component);
+  for (const KeyframeId id : view_.keyframe_ids()) {
+    if (view_.at(id).component == goes) tables.keyframes.edit(id.value).component = stays;
+  }
 }
 
 void Map::apply(const MapEdit& edit) {

@@ -28,6 +28,10 @@ class Map {
   void move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world,
             const std::vector<std::pair<LandmarkId, Eigen::Vector3d>>& point_in_world);
 
+  // Those of two keyframes become one, named by the older: their places against one another are
+  // known from now on. Nothing where they are one already, or a keyframe is gone.
+  void join_components(KeyframeId a, KeyframeId b);
+
   void set_camera(CameraId id, const Camera& camera);  // refined intrinsics
   void set_keep(KeyframeId id);                        // exempt from culling
 

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "backend/map/byte_stream.h"
+#include "backend/map/components.h"
 #include "backend/map/covisibility.h"
 #include "backend/map/landmark_attributes.h"
 #include "backend/map/map_file_format.h"
@@ -172,6 +173,7 @@ class MapDecoder {
     if (odometry_ != 0) end.fail("odometry is missing, or too much of it");
     link_tree(end);
     covisibility_.write(tables_.keyframes);
+    name_components(tables_);
     return std::move(tables_);
   }
 

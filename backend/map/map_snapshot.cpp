@@ -72,6 +72,14 @@ std::vector<KeyframeId> MapSnapshot::changed_keyframes(const MapSnapshot& since)
   return ids;
 }
 
+const Keyframe* MapSnapshot::newest_keyframe(CameraId camera) const {
+  for (std::uint32_t id = tables_.next_keyframe; id-- > 0;) {
+    const Keyframe* keyframe = find(KeyframeId(id));
+    if (keyframe != nullptr && keyframe->observations->camera == camera) return keyframe;
+  }
+  return nullptr;
+}
+
 const Keyframe* MapSnapshot::find_frame(CameraId camera, std::int64_t frame_index) const {
   for (std::uint32_t id = tables_.next_keyframe; id-- > 0;) {
     const Keyframe* keyframe = find(KeyframeId(id));
@@ -97,6 +105,11 @@ Rigid3d MapSnapshot::cam_from_world(KeyframeId id) const {
     id = erased->parent;
   }
   return cam_from_ancestor * at(id).cam_from_world;
+}
+
+KeyframeId MapSnapshot::component(KeyframeId id) const {
+  while (const ErasedKeyframe* erased = tables_.erased.find(id.value)) id = erased->parent;
+  return at(id).component;
 }
 
 std::optional<Matrix6d> MapSnapshot::keyframe_covariance(KeyframeId id) const {

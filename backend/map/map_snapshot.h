@@ -49,12 +49,18 @@ class MapSnapshot {
   // enter in the order of their frames, so recent ones are found at once.
   const Keyframe* find_frame(CameraId camera, std::int64_t frame_index) const;
 
+  // The newest living keyframe of a camera; null if there is none.
+  const Keyframe* newest_keyframe(CameraId camera) const;
+
   // Largest frame index of any keyframe of this camera ever added, erased ones included; -1 while
   // there is none.
   std::int64_t newest_frame_index(CameraId camera) const;
 
   // Pose of a keyframe that is or was in the map, through the spanning tree if it was erased.
   Rigid3d cam_from_world(KeyframeId id) const;
+
+  // The component of a keyframe that is or was in the map; likewise.
+  KeyframeId component(KeyframeId id) const;
 
   // How certain the poses of keyframes around the newest ones are, of each camera, as the
   // incremental smoother found in its last update: null before the first one (a map that was

@@ -11,6 +11,9 @@ namespace hybrid_slam {
 
 namespace {
 
+constexpr double kUnknownTranslation = 30;  // [m]
+constexpr double kUnknownRotation = 1;      // [rad]
+
 bool same_camera(const Keyframe& a, const Keyframe& b) {
   return a.observations->camera == b.observations->camera;
 }
@@ -26,6 +29,20 @@ KeyframeId keyframe_after(const MapTables& tables, KeyframeId id) {
 }
 
 }  // namespace
+
+UncertainMotion unknown_motion(const Rigid3d& guess) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(kUnknownTranslation),
+      Eigen::Vector3d::Constant(kUnknownRotation);
+  return {guess, Matrix6d(sigma.cwiseProduct(sigma).asDiagonal())};
+}
+
+// No chain of measured motions that is of use gets that far.
+bool is_loose(const Odometry& odometry) {
+  const double rotation = kUnknownRotation / 2;
+  return odometry.motion.covariance.bottomRightCorner<3, 3>().diagonal().minCoeff() >=
+         rotation * rotation;
+}
 
 bool is_valid(const Odometry& odometry, std::size_t keypoint_count) {
   const Matrix6d& covariance = odometry.motion.covariance;

@@ -25,6 +25,12 @@ struct Odometry {
   std::size_t followed() const { return keypoints.size() + dropped; }
 };
 
+// A motion of which nothing is known but a guess: 30 m and a radian, standard deviations, each way.
+UncertainMotion unknown_motion(const Rigid3d& guess);
+
+// Whether it is such a motion, or one that contains it: it holds nothing together.
+bool is_loose(const Odometry& odometry);
+
 // Whether all is finite, the covariance symmetric and positive definite, and every keypoint one of
 // so many.
 bool is_valid(const Odometry& odometry, std::size_t keypoint_count);

@@ -3,12 +3,22 @@
 #include <algorithm>
 #include <set>
 
+#include "backend/map/odometry.h"
+
 namespace hybrid_slam {
 
 namespace {
 
 bool is_metric(const MapSnapshot& map, KeyframeId id) {
   return baseline(map.camera(map.at(id))) > 0;
+}
+
+// Of a motion between two components: it keeps them from falling apart and holds nothing.
+Matrix7d loose_information() {
+  const UncertainMotion unknown = unknown_motion(Rigid3d());
+  Matrix7d information = Matrix7d::Identity();
+  information.topLeftCorner<6, 6>() = unknown.covariance.diagonal().cwiseInverse().asDiagonal();
+  return information;
 }
 
 // Motions that the map remembers, each pair once.
@@ -22,8 +32,10 @@ class Remembered {
     if (map_.find(a) == nullptr || map_.find(b) == nullptr) return;
     if (!pairs_.insert(std::minmax(a, b)).second) return;
     const Sim3d a_from_b(map_.at(a).cam_from_world * inverse(map_.at(b).cam_from_world));
+    const bool joined = map_.at(a).component == map_.at(b).component;
     constraints_.push_back(
-        {a, b, a_from_b, motion_information(map_, a, b, a_from_b, options_), false});
+        {a, b, a_from_b,
+         joined ? motion_information(map_, a, b, a_from_b, options_) : loose_information(), false});
   }
 
  private:

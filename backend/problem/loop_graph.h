@@ -38,10 +38,11 @@ using LoopEnds = std::pair<KeyframeId, KeyframeId>;
 
 // The essential graph of a map (ORB-SLAM2, section V-C): its spanning tree, its strong covisibility
 // edges, the loops closed before and the pairs that odometry joins, which hold the relative poses
-// that the map has now, and `loops`, measured. Loops need not come with weights of their own: an
-// information that is the identity is replaced by motion_information(). Every keyframe varies but
-// the origin and, where there are loops, what is older than all their ends and joined by no edge to
-// what is newer: it does not bend. Loops come last among the constraints, in their order.
+// that the map has now, loosely between components, and `loops`, measured. Loops need not come with
+// weights of their own: an information that is the identity is replaced by motion_information().
+// Every keyframe varies but the origin and, where there are loops, what is older than all their
+// ends and joined by no edge to what is newer: it does not bend. Loops come last among the
+// constraints, in their order.
 ProblemConfig make_loop_graph(const MapSnapshot& map, const std::vector<PoseConstraint>& loops,
                               const LoopGraphOptions& options,
                               const std::vector<LoopEnds>& closed = {});

@@ -99,8 +99,10 @@ std::vector<SimilarKeyframe> LoopDetector::candidates(const MapSnapshot& map,
       places.similar(places.bow_of(keyframe.id), places.size(), {});
   const auto gap = static_cast<std::uint32_t>(options_.min_gap);
   std::erase_if(found, [&](const SimilarKeyframe& other) {
-    return keyframe.id.value < gap || other.keyframe.value > keyframe.id.value - gap ||
-           map.find(other.keyframe) == nullptr ||
+    const Keyframe* const there = map.find(other.keyframe);
+    if (there == nullptr || !(other.keyframe < keyframe.id)) return true;
+    const bool recent = keyframe.id.value < gap || other.keyframe.value > keyframe.id.value - gap;
+    return (recent && there->component == keyframe.component) ||
            shared_landmarks(keyframe, other.keyframe) >= options_.max_shared_landmarks;
   });
   const double base = found.size() >= kEnoughForBase ? found[found.size() * 3 / 4].score

@@ -11,7 +11,8 @@ namespace hybrid_slam {
 // What follows is cheap and strict (geometry), so the defaults prefer recall: a lone track that
 // crosses another shows it for three to five keyframes. docs/vocabulary.md has the measurements.
 struct LoopDetectorOptions {
-  int min_gap = 10;               // least difference of the ids of a loop's ends, of all cameras
+  // Least difference of the ids of a loop's ends, of all cameras; none between two components.
+  int min_gap = 10;
   int max_shared_landmarks = 15;  // with so many in common, two keyframes are connected already
   // Of the most words that any candidate shares. An image with few features shares few words even
   // with itself, so this only drops what is hopeless.

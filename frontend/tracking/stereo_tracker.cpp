@@ -126,13 +126,17 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
     result.source = PoseSource::kRelocalization;
     uncertain_ = hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
                                              options_.pose);
+  } else if (options_.new_components && allow_keyframe && !last_.waits_for_keyframe()) {
+    result.counts = {};
+    begin_component(frame, map, result);
   }
   if (result.tracked()) {
     result.cam_from_world = frame.cam_from_world;
     result.cam_from_reference =
         frame.cam_from_world * inverse(map.cam_from_world(result.reference));
     write_covariance(map, *uncertain_, result);
-    if (allow_keyframe && !last_.waits_for_keyframe() && wants_keyframe(frame, map, result)) {
+    if (!result.keyframe && allow_keyframe && !last_.waits_for_keyframe() &&
+        wants_keyframe(frame, map, result)) {
       result.keyframe = make_keyframe(frame, map, result.reference);
     }
   }
@@ -143,16 +147,39 @@ TrackedFrame StereoTracker::initialize(Frame& frame, const MapSnapshot& map) con
   TrackedFrame result;
   result.frame_index = frame.index;
   result.time = frame.time;
+  if (!can_carry_map(frame)) return result;
+  result.source = PoseSource::kInitialization;
+  result.keyframe = make_keyframe(frame, map, KeyframeId());
+  return result;
+}
+
+// Whether one pair shows enough to begin a map, or a component of it.
+bool StereoTracker::can_carry_map(const Frame& frame) const {
   const auto enough = static_cast<long>(options_.min_initial_share * options_.max_features);
   const auto& u_right = frame.features.u_right;
   const auto with_depth =
       std::count_if(u_right.begin(), u_right.end(), [](float u) { return !std::isnan(u); });
-  if (static_cast<long>(frame.size()) < enough || with_depth < enough) {
-    return result;
-  }
+  return static_cast<long>(frame.size()) >= enough && with_depth >= enough;
+}
+
+// Where the vehicle is against the map is not known: the frame gets the pose of the newest stereo
+// keyframe, as good as any, and is held there by nothing.
+bool StereoTracker::begin_component(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
+  const Keyframe* const newest = map.newest_keyframe(camera_id_);
+  if (newest == nullptr || !can_carry_map(frame)) return false;
+  clear(frame);
+  frame.cam_from_world = newest->cam_from_world;
   result.source = PoseSource::kInitialization;
-  result.keyframe = make_keyframe(frame, map, KeyframeId());
-  return result;
+  result.reference = newest->id;
+  result.keyframe = make_stereo_keyframe(camera_id_, camera_, frame, newest->id, close_depth(),
+                                         options_.min_new_points);
+  Odometry odometry;
+  odometry.previous = newest->id;
+  odometry.motion = unknown_motion(Rigid3d());
+  uncertain_ = moved(UncertainPose::of_keyframe(camera_id_, frame.index, newest->id),
+                     odometry.motion, frame.index);
+  result.keyframe->odometry = std::make_shared<const Odometry>(std::move(odometry));
+  return true;
 }
 
 void StereoTracker::correct_disparities(Frame& frame) const {

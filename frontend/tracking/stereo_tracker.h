@@ -27,6 +27,9 @@ struct StereoTrackerOptions : TrackerOptions {
   int min_reference_matches = 30;
   int min_pose_inliers = 10;
   int min_odometer_inliers = 20;  // to go on by odometry where the map does not hold
+  // Whether the map goes on with another component where the vehicle is lost and sees no place that
+  // it knows; see backend/map/components.h.
+  bool new_components = true;
   StereoOdometerOptions odometer;
   DisparityCalibratorOptions disparity;
 
@@ -52,6 +55,8 @@ class StereoTracker {
 
  private:
   TrackedFrame initialize(Frame& frame, const MapSnapshot& map) const;
+  bool can_carry_map(const Frame& frame) const;
+  bool begin_component(Frame& frame, const MapSnapshot& map, TrackedFrame& result);
   void correct_disparities(Frame& frame) const;
   std::optional<StereoMotion> predict(Frame& frame, TrackedFrame& result);
   std::vector<PoseObservation> points_of_last_frame(const StereoMotion& motion,

@@ -221,9 +221,12 @@ void add(const Matrix6d& times, const UncertainPose& pose, UncertainPose& sum) {
   sum.by_landmark.assign(by_landmark.begin(), by_landmark.end());
 }
 
+// How certain it is against the origin: nothing is known of where another component lies.
 bool is_known(const MapSnapshot& map, KeyframeId id) {
-  return id == map.origin() ||
-         (map.covariances() != nullptr && map.find(id) != nullptr && map.covariances()->knows(id));
+  if (id == map.origin()) return true;
+  const Keyframe* const keyframe = map.find(id);
+  return keyframe != nullptr && map.covariances() != nullptr &&
+         keyframe->component == map.at(map.origin()).component && map.covariances()->knows(id);
 }
 
 // The keyframe that those are joined to of which the map knows nothing; invalid if there is none.
