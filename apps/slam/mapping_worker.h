@@ -66,7 +66,8 @@ class MappingWorker {
   std::shared_ptr<const PublishedMap> published() const { return snapshots_.get(); }
 
   // Until the map has begun, there is nothing to track against.
-  void wait_for_map(std::size_t version) const { snapshots_.next(version); }
+  // Waits for the map after version `seen`. False once there will be none any more.
+  bool wait_for_map(std::size_t& seen) const { return snapshots_.next(seen) != nullptr; }
   std::size_t version() const { return snapshots_.version(); }
 
   // What is queued is still done.

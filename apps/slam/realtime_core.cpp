@@ -76,12 +76,15 @@ class RealtimeCore final : public SlamCore {
     if (paced_) mapping_.hurry();
     const auto& odometry = job.keyframe.odometry;
     const bool first = !map()->origin().valid() || (odometry != nullptr && is_loose(*odometry));
-    const std::size_t version = mapping_.version();
+    const CameraId camera = job.keyframe.observations->camera;
+    const std::int64_t index = job.frame_index();
+    std::size_t seen = mapping_.version();
     if (!mapping_.add(std::move(job))) {  // its thread has failed
       mapping_.finish();
       mapping_.rethrow();
     }
-    if (first) mapping_.wait_for_map(version);
+    while (first && map()->newest_frame_index(camera) < index && mapping_.wait_for_map(seen)) {
+    }
   }
 
   // Mapping first: the others learn that it takes nothing any more, and it tells them nothing.

@@ -1,6 +1,6 @@
 #include "backend/map/components.h"
 
-#include <utility>
+#include <algorithm>
 #include <vector>
 
 #include "backend/map/map_tables.h"
@@ -21,8 +21,9 @@ class Sets {
     return id;
   }
   void join(KeyframeId a, KeyframeId b) {
-    const auto [low, high] = std::minmax(name_of(a), name_of(b));
-    above_[KeyframeId(high)] = KeyframeId(low);
+    const KeyframeId first = name_of(a);
+    const KeyframeId second = name_of(b);
+    above_[std::max(first, second)] = std::min(first, second);
   }
 
  private:

@@ -5,7 +5,9 @@
 namespace hybrid_slam {
 
 void LastFrame::follow(const MapSnapshot& map) {
+  const bool arrived = requested_ && map.newest_frame_index(camera_) >= *requested_;
   if (!tracked_ || !frame_) {
+    if (arrived) requested_.reset();
     return;
   }
   if (requested_) {
@@ -18,9 +20,7 @@ void LastFrame::follow(const MapSnapshot& map) {
       const bool has_all_features = keyframe->landmarks.size() == frame_->size();
       if (is_that && has_all_features) frame_->landmarks = keyframe->landmarks;
     }
-    if (map.newest_frame_index(camera_) >= *requested_) {
-      requested_.reset();
-    }
+    if (arrived) requested_.reset();
   }
   if (reference_.valid()) {
     frame_->cam_from_world = cam_from_reference_ * map.cam_from_world(reference_);

@@ -54,11 +54,15 @@ TEST_CASE("Lost in unknown ground, the map goes on in another component", "[inte
   const SimulatedSource source = interrupted_lap(45, 1);
   for (const bool realtime : {false, true}) {
     const RunResult result = run(source, realtime);
-    CHECK(result.frames.lost == static_cast<int>(kDark));
+    // In realtime the last keyframe may still be on its way when the light comes back.
+    const int late = result.frames.lost - static_cast<int>(kDark);
+    CHECK(late >= 0);
+    CHECK(late <= (realtime ? 2 : 0));
     CHECK(result.components == 2);
     CHECK(result.frames.tracked == 20);
-    CHECK(result.frames.other_components == 15);
-    CHECK(result.records[20 + kDark].frame.source == PoseSource::kInitialization);
+    CHECK(result.frames.other_components == 15 - late);
+    CHECK(result.records[20 + kDark + static_cast<std::size_t>(late)].frame.source ==
+          PoseSource::kInitialization);
     CHECK(worst_error(result, source) < 0.05);
     CHECK(faults_of(*result.map) == "");
     // It is still two when it is read from a file.
@@ -73,9 +77,11 @@ TEST_CASE("Components are joined when the vehicle comes back", "[integration]") 
       INFO("seed " << seed << (realtime ? ", realtime" : ", every frame"));
       const RunResult result = run(source, realtime);
       CHECK(result.components == 1);
-      CHECK(result.frames.lost == static_cast<int>(kDark));
+      const int late = result.frames.lost - static_cast<int>(kDark);
+      CHECK(late >= 0);
+      CHECK(late <= (realtime ? 2 : 0));
       CHECK(result.frames.other_components == 0);
-      CHECK(result.frames.tracked == static_cast<int>(source.size() - kDark));
+      CHECK(result.frames.tracked == static_cast<int>(source.size() - kDark) - late);
       CHECK(worst_error(result, source) < 0.1);
       CHECK(faults_of(*result.map) == "");
     }
