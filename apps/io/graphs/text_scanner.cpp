@@ -15,7 +15,7 @@ constexpr std::string_view kSeparators = " \t\r,\n";
 }  // namespace
 
 TextScanner::TextScanner(std::filesystem::path path)
-    : path_(std::move(path)), text_(read_file(path_)) {}
+    : path_(std::move(path)), text_(read_text_file(path_)) {}
 
 bool TextScanner::more_on_line() {
   at_ = std::min(text_.find_first_not_of(kBlanks, at_), text_.size());
