@@ -13,7 +13,7 @@ namespace hybrid_slam {
 // left perturbation does. Rotations that differ by up to pi are told apart.
 class PosePrior final : public ceres::SizedCostFunction<6, 7>, public LeftJacobian {
  public:
-  // Throws std::logic_error unless the information is symmetric and positive definite.
+  // Throws std::logic_error unless the information is symmetric and positive semi-definite.
   PosePrior(const Rigid3d& measured_cam_from_world, const Matrix6d& information);
 
   bool Evaluate(const double* const* blocks, double* residual, double** jacobians) const override;

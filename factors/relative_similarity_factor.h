@@ -14,7 +14,7 @@ namespace hybrid_slam {
 // RelativePoseFactor.
 class RelativeSimilarityFactor final : public ceres::SizedCostFunction<7, 8, 8> {
  public:
-  // Throws std::logic_error unless the information is symmetric and positive definite.
+  // Throws std::logic_error unless the information is symmetric and positive semi-definite.
   RelativeSimilarityFactor(const Sim3d& measured_a_from_b, const Matrix7d& information);
 
   // False if a scale is not positive.

@@ -8,6 +8,7 @@
 
 #include "cameras/geometry/sim3d.h"
 #include "frontend/input/image_sequence.h"
+#include "frontend/input/trajectory_file.h"
 
 namespace hybrid_slam {
 
@@ -19,16 +20,6 @@ std::string tum_line(const StampedPose& pose);
 
 // A line per pose. Throws OutputError.
 void write_tum(const std::filesystem::path& path, std::span<const StampedPose> trajectory);
-
-struct TrajectoryFile {
-  Trajectory poses;
-  bool has_times = false;  // if not, the times are 0, 1, 2, ...
-};
-
-// A TUM file (8 columns) or KITTI file (12 columns: 3x4 row-major world_from_cam, no times). Throws
-// InputError naming file and line if there is no pose, a line has another number of columns than
-// the first, a value is not finite, a rotation is none, or times do not ascend strictly.
-TrajectoryFile read_trajectory(const std::filesystem::path& path);
 
 // A pose of the estimate and that of the truth at the same time, both world_from_cam (the worlds
 // may differ).

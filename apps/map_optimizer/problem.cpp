@@ -151,6 +151,9 @@ OptimizerProblem make_problem(const GraphFile& file, const OptimizerOptions& opt
                               const std::filesystem::path& input) {
   const bool bundles_of_map = file.map != nullptr && !file.graph.frames.empty() &&
                               options.problem != ProblemKind::kIncremental;
+  if (options.problem == ProblemKind::kIncremental && !file.graph.factors.empty()) {
+    throw InputError(input.string() + ": holds landmarks, which --problem incremental cannot feed");
+  }
   OptimizerProblem problem;
   if (bundles_of_map) {
     problem = make_map_problem(file, options, input);

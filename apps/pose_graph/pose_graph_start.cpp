@@ -4,7 +4,7 @@
 #include <queue>
 #include <utility>
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 #include <Eigen/SVD>
 
 #include "apps/pose_graph/edge_laplacian.h"
@@ -169,9 +169,13 @@ std::vector<PoseGraphStart> all_pose_graph_starts() {
 }
 
 IsotropicWeights isotropic_weights(const Matrix6d& information) {
-  const Eigen::Matrix3d translation = information.topLeftCorner<3, 3>();
-  const Eigen::Matrix3d rotation = information.bottomRightCorner<3, 3>();
-  return {1.5 / rotation.inverse().trace(), 3 / translation.inverse().trace()};
+  const auto over_trace = [](double weight, const Eigen::Matrix3d& block) {
+    const Eigen::LLT<Eigen::Matrix3d> llt(block);
+    if (llt.info() != Eigen::Success) return 0.0;  // nothing is known in some direction
+    return weight / llt.solve(Eigen::Matrix3d::Identity()).trace();
+  };
+  return {over_trace(1.5, information.bottomRightCorner<3, 3>()),
+          over_trace(3, information.topLeftCorner<3, 3>())};
 }
 
 double isotropic_objective(const FactorGraph& graph) {

@@ -21,7 +21,7 @@ std::vector<PoseGraphStart> all_pose_graph_starts();
 // Weights of an edge under isotropic noise closest to its information, as in SE-Sync (Rosen et al.,
 // IJRR 2019): F = sum rotation |R_b - R_a R_ab|_F^2 + translation |t_b - t_a - R_a t_ab|^2, with R,
 // t of world_from_frame. rotation = 3 / (2 tr(inverse of the information's rotation block)),
-// translation = 3 / tr(inverse of its translation block).
+// translation = 3 / tr(inverse of its translation block); 0 where a block is singular.
 struct IsotropicWeights {
   double rotation = 0;
   double translation = 0;

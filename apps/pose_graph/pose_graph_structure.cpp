@@ -1,33 +1,10 @@
 #include "apps/pose_graph/pose_graph_structure.h"
 
+#include "apps/pose_graph/connected_parts.h"
+
 namespace hybrid_slam {
 
 namespace {
-
-// Disjoint sets of frames; each set is named by its lowest frame.
-class ConnectedParts {
- public:
-  explicit ConnectedParts(std::size_t frames) : parent_(frames) {
-    for (std::size_t i = 0; i < frames; ++i) parent_[i] = i;
-  }
-
-  std::size_t part_of(std::size_t frame) {
-    while (parent_[frame] != frame) {
-      parent_[frame] = parent_[parent_[frame]];
-      frame = parent_[frame];
-    }
-    return frame;
-  }
-
-  void join(std::size_t a, std::size_t b) {
-    a = part_of(a);
-    b = part_of(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::size_t> parent_;
-};
 
 std::vector<char> known_frames(const FactorGraph& graph) {
   ConnectedParts parts(graph.frames.size());

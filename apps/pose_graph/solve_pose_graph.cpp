@@ -150,7 +150,8 @@ std::string PoseGraphOptions::validate() const {
 }
 
 bool is_pose_graph(const FactorGraph& graph) {
-  return !graph.edges.empty() && graph.observations.empty() && graph.similarity_edges.empty();
+  return !graph.edges.empty() && graph.observations.empty() && graph.similarity_edges.empty() &&
+         graph.factors.empty();
 }
 
 PoseGraphSummary solve_pose_graph(FactorGraph& graph, const PoseGraphOptions& options,

@@ -19,17 +19,26 @@ namespace fs = std::filesystem;
 
 namespace {
 
+void print_warnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) fmt::print(stderr, "trajectory_eval: {}\n", warning);
+}
+
 CameraPoses read_truth(const fs::path& given, TruthConvention convention) {
   const fs::path file = fs::is_directory(given) ? given / "camera_poses.txt" : given;
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const fs::path plural = folder / "times.txt";
   const fs::path singular = folder / "time.txt";
-  return read_camera_poses(file, read_times(fs::exists(plural) ? plural : singular), convention);
+  std::vector<std::string> warnings;
+  const auto times = read_times(fs::exists(plural) ? plural : singular, warnings);
+  CameraPoses poses = read_camera_poses(file, times, convention);
+  poses.warnings.insert(poses.warnings.begin(), warnings.begin(), warnings.end());
+  return poses;
 }
 
 Trajectory read_estimate(const fs::path& path) {
   TrajectoryFile file = read_trajectory(path);
   if (!file.has_times) throw InputError(path.string() + ": has no times");
+  print_warnings(file.warnings);
   return std::move(file.poses);
 }
 
@@ -47,9 +56,7 @@ void evaluate_hybrid(const std::string& estimate, const std::string& truth,
   const Trajectory stereo = read_estimate(fs::path(estimate) / "stereo.tum");
   const Trajectory fisheye = read_estimate(fs::path(estimate) / "fisheye.tum");
   const CameraPoses poses = read_truth(truth, convention);
-  for (const std::string& warning : poses.warnings) {
-    fmt::print(stderr, "trajectory_eval: {}\n", warning);
-  }
+  print_warnings(poses.warnings);
   const auto error = hybrid_error(stereo, fisheye, poses.stereo, poses.fisheye, max_difference);
   if (!error) {
     throw InputError(fmt::format("{}: no moment has both poses within {} s of {}", estimate,

@@ -5,6 +5,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -19,8 +20,8 @@ namespace {
 
 constexpr const char* kDescription =
     "Compares an estimated trajectory with the truth.\n"
-    "Files: TUM (t tx ty tz qx qy qz qw) or KITTI (3x4 row-major, no times), told by their "
-    "columns.\n"
+    "Files: TUM (t tx ty tz qx qy qz qw), EuRoC (ns, position, qw qx qy qz, ...) or KITTI\n"
+    "(3x4 row-major, no times), told by their header, columns and times.\n"
     "KITTI poses get the times of --times; without it they are paired by their number.";
 constexpr const char* kFooter =
     "ate: distance between true and estimated positions after alignment of the whole\n"
@@ -34,11 +35,16 @@ const std::map<std::string, TruthConvention> kTruthConventions{
     {"world_from_cam", TruthConvention::kWorldFromCam},
     {"cam_from_world", TruthConvention::kCamFromWorld}};
 
+const std::map<std::string, QuaternionOrder> kQuaternionOrders{{"xyzw", QuaternionOrder::kXyzw},
+                                                               {"wxyz", QuaternionOrder::kWxyz}};
+
 struct Options {
   std::string metric, estimate, truth, times;
   std::string align = "se3";
   double max_difference = 0.02;  // [s]
   std::size_t delta = 1;
+  QuaternionOrder estimate_order = QuaternionOrder::kUnknown;
+  QuaternionOrder truth_order = QuaternionOrder::kUnknown;
   TruthConvention convention = TruthConvention::kAuto;
   bool json = false;
 };
@@ -53,12 +59,24 @@ void set_times(TrajectoryFile& file, const std::vector<double>& times, const Opt
   file.has_times = true;
 }
 
+TrajectoryFile read_poses(const std::string& path, QuaternionOrder order) {
+  TrajectoryFile file = read_trajectory(path, order);
+  for (const std::string& warning : file.warnings) spdlog::warn(warning);
+  return file;
+}
+
+std::string time_range(const std::string& path, const Trajectory& poses) {
+  return fmt::format("{} from {:.3f} to {:.3f} s", path, poses.front().time, poses.back().time);
+}
+
 // With times on one side only, poses are paired by number if there are as many on both.
 std::vector<PosePair> read_pairs(const Options& options) {
-  TrajectoryFile estimate = read_trajectory(options.estimate);
-  TrajectoryFile truth = read_trajectory(options.truth);
+  TrajectoryFile estimate = read_poses(options.estimate, options.estimate_order);
+  TrajectoryFile truth = read_poses(options.truth, options.truth_order);
   if (!options.times.empty()) {
-    const std::vector<double> times = read_times(options.times);
+    std::vector<std::string> warnings;
+    const std::vector<double> times = read_times(options.times, warnings);
+    for (const std::string& warning : warnings) spdlog::warn(warning);
     set_times(estimate, times, options);
     set_times(truth, times, options);
   }
@@ -75,8 +93,10 @@ std::vector<PosePair> read_pairs(const Options& options) {
   }
   auto pairs = associate(estimate.poses, truth.poses, options.max_difference);
   if (pairs.empty()) {
-    throw InputError(fmt::format("{}: no pose is within {} s of one of {}", options.estimate,
-                                 options.max_difference, options.truth));
+    throw InputError(fmt::format("{}: no pose is within {} s of one of {}: {}, {}",
+                                 options.estimate, options.max_difference, options.truth,
+                                 time_range(options.estimate, estimate.poses),
+                                 time_range(options.truth, truth.poses)));
   }
   return pairs;
 }
@@ -157,6 +177,13 @@ int run(int argc, char** argv) {
   app.add_option("--delta", options.delta, "rpe: number of pairs that a motion spans")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  for (const auto& [name, order] : {std::pair("--est-quaternions", &options.estimate_order),
+                                    std::pair("--truth-quaternions", &options.truth_order)}) {
+    app.add_option(name, *order,
+                   "order in EST or TRUTH, where the file (8 columns) does not tell it")
+        ->transform(CLI::CheckedTransformer(kQuaternionOrders).description(""))
+        ->option_text("xyzw|wxyz");
+  }
   app.add_option("--gt-convention", options.convention,
                  "hybrid: how the poses of TRUTH are meant; auto (default) says which it took")
       ->transform(CLI::CheckedTransformer(kTruthConventions).description(""))

@@ -4,9 +4,8 @@
 #include <type_traits>
 #include <variant>
 
-#include <Eigen/Cholesky>
-
 #include "backend/problem/measurement_fault.h"
+#include "factors/whitening.h"
 
 namespace hybrid_slam {
 
@@ -34,16 +33,9 @@ const char* fault_of(const FactorGraph& graph, const GraphObservation& observati
 // An edge of either kind.
 template <typename Edge>
 const char* edge_fault(const Edge& edge) {
-  constexpr double kTolerance = 1e-9;
   if (edge.a == edge.b) return "joins a frame to itself";
   if (!edge.a_from_b.params.allFinite()) return "measurement is not finite";
-  const auto& information = edge.information;
-  if (!information.allFinite() ||
-      (information - information.transpose()).norm() > kTolerance * information.norm()) {
-    return "information must be finite and symmetric";
-  }
-  if (information.llt().info() != Eigen::Success) return "information must be positive definite";
-  return nullptr;
+  return information_fault(edge.information);
 }
 
 const char* fault_of(const FactorGraph& graph, const GraphEdge& edge) {

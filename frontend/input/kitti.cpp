@@ -77,7 +77,7 @@ std::unique_ptr<ImageSequence> open_kitti(const fs::path& path, const std::strin
   for (const auto& [images, side] : {std::pair(&left, "image_0"), std::pair(&right, "image_1")}) {
     if (images->empty()) throw InputError((*folder / side).string() + ": holds no images");
   }
-  const std::vector<double> times = read_times(*folder / "times.txt");
+  const std::vector<double> times = read_times(*folder / "times.txt", info.warnings);
   NumberedFrames frames = match_frames(times, *folder / "times.txt", left, right, info.warnings);
   info.stereo = read_calibration(*folder / "calib.txt", first_image_size(frames.files));
   const fs::path truth =

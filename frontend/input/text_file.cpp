@@ -1,5 +1,7 @@
 #include "frontend/input/text_file.h"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -19,6 +21,29 @@ std::string_view trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
+std::string_view unquote(std::string_view field) {
+  const bool quoted = field.size() > 1 && field.front() == '"' && field.back() == '"';
+  return quoted ? field.substr(1, field.size() - 2) : field;
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+// Words that name columns: no field begins as a number does, or is one.
+bool is_header(const std::vector<std::string_view>& fields) {
+  return fields.size() > 1 && std::all_of(fields.begin(), fields.end(), [](std::string_view field) {
+           return !field.empty() && std::isalpha(static_cast<unsigned char>(field[0])) != 0 &&
+                  !field.starts_with("nan") && !field.starts_with("inf");
+         });
+}
+
+// A comma with a digit on both sides, and the only one.
+bool has_decimal_comma(std::string_view field) {
+  const std::size_t comma = field.find(',');
+  return comma != std::string_view::npos && comma > 0 && comma + 1 < field.size() &&
+         field.find(',', comma + 1) == std::string_view::npos && is_digit(field[comma - 1]) &&
+         is_digit(field[comma + 1]);
+}
+
 std::ifstream open_file(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw InputError(path.string() + ": no such file");
@@ -28,6 +53,24 @@ std::ifstream open_file(const fs::path& path) {
   if (is_regular) file.open(path, std::ios::binary);
   if (!file.is_open()) throw InputError(path.string() + ": cannot be read");
   return file;
+}
+
+// `comment`: the last one before the first line.
+std::vector<TextLine> read_lines_and_comment(const fs::path& path, std::string& comment) {
+  const std::string content = read_text_file(path);
+  std::vector<TextLine> lines;
+  std::size_t begin = 0;
+  for (int number = 1; begin < content.size(); ++number) {
+    const std::size_t end = std::min(content.find('\n', begin), content.size());
+    const std::string_view text = trim(std::string_view(content).substr(begin, end - begin));
+    if (text.starts_with('#')) {
+      if (lines.empty()) comment = text;
+    } else if (!text.empty()) {
+      lines.push_back({number, std::string(text)});
+    }
+    begin = end + 1;
+  }
+  return lines;
 }
 
 }  // namespace
@@ -52,17 +95,23 @@ std::string read_file(const fs::path& path) {
   return content;
 }
 
-std::vector<TextLine> read_lines(const fs::path& path) {
-  std::ifstream file = open_file(path);
-  std::vector<TextLine> lines;
-  std::string text;
-  for (int number = 1; std::getline(file, text); ++number) {
-    const std::string_view content = trim(text);
-    if (content.empty() || content.front() == '#') continue;
-    lines.push_back({number, std::string(content)});
+std::string read_text_file(const fs::path& path) {
+  constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
+  std::string content = read_file(path);
+  const std::string_view start = std::string_view(content).substr(0, 2);
+  // Without its mark, UTF-16 shows by the zero in each of its first letters.
+  if (start == "\xFF\xFE" || start == "\xFE\xFF" ||
+      (start.size() == 2 && (start[0] == '\0') != (start[1] == '\0'))) {
+    throw InputError(path.string() +
+                     ": is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)");
   }
-  if (file.bad()) throw InputError(path.string() + ": reading failed");
-  return lines;
+  if (content.starts_with(kUtf8Mark)) content.erase(0, kUtf8Mark.size());
+  return content;
+}
+
+std::vector<TextLine> read_lines(const fs::path& path) {
+  std::string ignored;
+  return read_lines_and_comment(path, ignored);
 }
 
 std::vector<std::string_view> split_fields(std::string_view text, char separator) {
@@ -72,7 +121,7 @@ std::vector<std::string_view> split_fields(std::string_view text, char separator
     std::size_t begin = text.find_first_not_of(kSeparators);
     while (begin != std::string_view::npos) {
       const std::size_t end = std::min(text.find_first_of(kSeparators, begin), text.size());
-      fields.push_back(text.substr(begin, end - begin));
+      fields.push_back(unquote(text.substr(begin, end - begin)));
       begin = text.find_first_not_of(kSeparators, end);
     }
     return fields;
@@ -80,10 +129,28 @@ std::vector<std::string_view> split_fields(std::string_view text, char separator
   std::size_t begin = 0;
   while (true) {
     const std::size_t end = text.find(separator, begin);
-    fields.push_back(trim(text.substr(begin, end - begin)));
-    if (end == std::string_view::npos) return fields;
+    fields.push_back(unquote(trim(text.substr(begin, end - begin))));
+    if (end == std::string_view::npos) break;
     begin = end + 1;
   }
+  if (fields.size() > 1 && fields.back().empty()) fields.pop_back();
+  return fields;
+}
+
+bool has_decimal_commas(std::string_view text) {
+  std::size_t decimal = 0;
+  std::size_t begin = text.find_first_not_of(kBlanks);
+  while (begin != std::string_view::npos) {
+    const std::size_t end = std::min(text.find_first_of(kBlanks, begin), text.size());
+    const std::string_view field = text.substr(begin, end - begin);
+    if (has_decimal_comma(field)) {
+      ++decimal;
+    } else if (field.find(',') != std::string_view::npos) {
+      return false;  // a list
+    }
+    begin = text.find_first_not_of(kBlanks, end);
+  }
+  return decimal > 1;
 }
 
 double parse_number(std::string_view field, const fs::path& path, int line) {
@@ -102,19 +169,33 @@ double parse_number(std::string_view field, const fs::path& path, int line) {
   return value;
 }
 
-std::vector<NumberRow> read_number_rows(const fs::path& path, char separator) {
-  std::vector<NumberRow> rows;
-  for (const TextLine& line : read_lines(path)) {
+NumberTable read_number_table(const fs::path& path, char separator) {
+  NumberTable table;
+  const std::vector<TextLine> lines = read_lines_and_comment(path, table.header);
+  for (const TextLine& line : lines) {
+    if (has_decimal_commas(line.text)) {
+      throw line_error(path, line.number, "decimal commas; write numbers with a point");
+    }
+    const std::vector<std::string_view> fields = split_fields(line.text, separator);
+    if (&line == &lines.front() && is_header(fields)) {
+      table.header = line.text;
+      continue;
+    }
+    if (table.rows.empty()) table.first_row = line.text;
     NumberRow row{line.number, {}};
-    for (const std::string_view field : split_fields(line.text, separator)) {
+    for (const std::string_view field : fields) {
       row.values.push_back(parse_number(field, path, line.number));
     }
-    rows.push_back(std::move(row));
+    table.rows.push_back(std::move(row));
   }
-  return rows;
+  return table;
 }
 
-std::vector<double> read_times(const fs::path& path) {
+std::vector<NumberRow> read_number_rows(const fs::path& path, char separator) {
+  return read_number_table(path, separator).rows;
+}
+
+std::vector<double> read_times(const fs::path& path, std::vector<std::string>& warnings) {
   std::vector<double> times;
   for (const NumberRow& row : read_number_rows(path, ' ')) {
     if (row.values.size() != 1) throw line_error(path, row.line, "expected one time per line");
@@ -124,6 +205,12 @@ std::vector<double> read_times(const fs::path& path) {
     times.push_back(row.values[0]);
   }
   if (times.empty()) throw InputError(path.string() + ": holds no times");
+  if (times.back() >= kLeastNanoseconds) {
+    warnings.push_back(path.string() + ": read as nanoseconds: " +
+                       std::to_string(static_cast<std::int64_t>(times.back())) +
+                       " is too much for seconds");
+    for (double& time : times) time *= 1e-9;
+  }
   return times;
 }
 

@@ -156,7 +156,7 @@ std::unique_ptr<ImageSequence> open_uwslam(const fs::path& path, const std::stri
   info.layout = "uwslam";
   const ImageLists images = list_images(*folder);
   const fs::path times_path = times_file(*folder);
-  const std::vector<double> times = read_times(times_path);
+  const std::vector<double> times = read_times(times_path, info.warnings);
   NumberedFrames frames = match_frames(times, times_path, images.left, images.right, info.warnings);
   info.stereo = read_calibration(calibration_folder(*folder));
   check_image_size(first_image_size(frames.files), {info.stereo.width, info.stereo.height},

@@ -128,6 +128,39 @@ TEST_CASE("trajectory_eval hybrid compares the arm's pose, in either convention"
   CHECK(late.err.find("no moment has both poses") != std::string::npos);
 }
 
+TEST_CASE("trajectory_eval takes EuRoC truth, and shows both ranges where no times meet") {
+  const TempFolder folder;
+  Trajectory truth = winding_path(40);
+  for (StampedPose& pose : truth) pose.time += 1403636579;
+  write_tum(folder.path() / "t.tum", truth);
+  std::string csv, plain;
+  for (const StampedPose& pose : truth) {
+    const auto q = pose.world_from_cam.rotation();
+    const auto t = pose.world_from_cam.translation();
+    const std::string values =
+        fmt::format(",{},{},{},{},{},{},{}\n", t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
+    csv += fmt::format("{}", std::llround(pose.time * 1e9)) + values;
+    plain += fmt::format("{}", pose.time) + values;
+  }
+  write_text(folder.path() / "t.csv", "#timestamp [ns],x,y,z,q_w,q_x,q_y,q_z\n" + csv);
+  write_text(folder.path() / "seconds.csv", plain);
+  write_tum(folder.path() / "early.tum", winding_path(40));
+  for (const char* const files :
+       {"t.tum t.csv", "t.csv t.tum", "t.tum seconds.csv --truth-quaternions wxyz"}) {
+    const Outcome outcome = run_eval(folder, std::string("rpe ") + files + " --json");
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    const auto json = nlohmann::json::parse(outcome.out);
+    CHECK(json["pairs"] == 40);
+    CHECK(json["translation_m"]["max"].get<double>() < 1e-6);
+    CHECK(json["rotation_deg"]["max"].get<double>() < 1e-4);
+  }
+  const Outcome apart = run_eval(folder, "ate early.tum t.csv");
+  CHECK(apart.code == 3);
+  CHECK(apart.err.find("early.tum from 0.000 to 3.900 s, t.csv from 1403636579.000 to "
+                       "1403636582.900 s") != std::string::npos);
+}
+
 TEST_CASE("trajectory_eval documents and uses its exit codes") {
   const TempFolder folder;
   write_tum(folder.path() / "t.tum", winding_path(10));

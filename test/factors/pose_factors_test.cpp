@@ -7,6 +7,7 @@
 
 #include "cameras/geometry/se3.h"
 #include "factors/manifolds.h"
+#include "factors/point_in_frame.h"
 #include "factors/pose_prior.h"
 #include "factors/relative_pose_factor.h"
 #include "factors/relative_similarity_factor.h"
@@ -177,6 +178,43 @@ TEST_CASE("PosePrior: value, and Jacobian against numeric differences") {
     expected << error.translation(), 2 * Eigen::Quaterniond(error.rotation()).vec();
     const double chi2 = expected.dot(information * expected);
     CHECK(residual_of(factor, blocks).squaredNorm() == Approx(chi2).epsilon(1e-9).margin(1e-12));
+  }
+}
+
+TEST_CASE("Pose factors: an information that is singular weighs what it measures") {
+  Random random(46);
+  for (int i = 0; i < 20; ++i) {
+    const Rigid3d measured = random.rigid(2, 3.1);
+    Eigen::Matrix<double, 6, 3> root;
+    for (int k = 0; k < 3; ++k) root.col(k) = random.vector(6, 1);
+    const Matrix6d information = root * root.transpose();
+    const RelativePoseFactor factor(measured, information);
+    const Rigid3d a = random.rigid(2, 3.1);
+    const Rigid3d b = random.rigid(2, 3.1);
+    const std::vector<FactorBlock> blocks = {{a.params, &kPose}, {b.params, &kPose}};
+    CHECK(factor_mismatch(factor, blocks) < 1e-8);
+    const RelativePoseFactor unweighted(measured, Matrix6d::Identity());
+    const Vector6d error = residual_of(unweighted, blocks);
+    CHECK(residual_of(factor, blocks).squaredNorm() ==
+          Approx(error.dot(information * error)).epsilon(1e-9));
+  }
+  CHECK(whitening_of<6>(Matrix6d::Zero()).isZero());
+}
+
+TEST_CASE("PointInFrame: residual and Jacobians") {
+  Random random(47);
+  for (int i = 0; i < 50; ++i) {
+    const Rigid3d sensor_from_cam = random.rigid(1, 3.1);
+    const Rigid3d cam_from_world = random.rigid(2, 3.1);
+    const Eigen::Vector3d point = random.vector(3, 5);
+    const Eigen::Vector3d measured = random.vector(3, 5);
+    const Eigen::Matrix3d information = random_information<3>(random);
+    const PointInFrame factor(measured, information, sensor_from_cam);
+    const std::vector<FactorBlock> blocks = {{cam_from_world.params, &kPose}, {point, nullptr}};
+    CHECK(factor_mismatch(factor, blocks) < 1e-8);
+    const Eigen::Vector3d error = sensor_from_cam * (cam_from_world * point) - measured;
+    CHECK(residual_of(factor, blocks).squaredNorm() ==
+          Approx(error.dot(information * error)).epsilon(1e-9));
   }
 }
 

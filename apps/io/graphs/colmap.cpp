@@ -125,12 +125,27 @@ void add_observations(const ColmapModel& model, const Index<std::uint64_t>& poin
   }
 }
 
+// The images of a rig's frame stay where they are on it. An edge holds them there, so stiff that
+// what the observations bend it by is lost among their noise: 1e-5 rad are 0.01 px at a focal
+// length of 1000 px; when the model is written, the rest of it goes.
+void add_rigs(const ColmapModel& model, FactorGraph& graph) {
+  constexpr double kTurn = 1e-6;   // sigma [rad]
+  constexpr double kShift = 1e-6;  // sigma by the distance of the two
+  for (const ColmapRigidPair& pair : rigid_pairs(model)) {
+    GraphEdge edge{pair.a, pair.b, pair.a_from_b, Matrix6d::Zero(), false};
+    const double distance = pair.a_from_b.translation().norm();
+    const double shift = kShift * (distance > 0 ? distance : 1);
+    edge.information.diagonal() << Eigen::Vector3d::Constant(1 / (shift * shift)),
+        Eigen::Vector3d::Constant(1 / (kTurn * kTurn));
+    graph.edges.push_back(edge);
+  }
+}
+
 GraphFile to_graph(const ColmapModel& model) {
   const auto cameras = index_by_id<std::uint32_t>(model, model.cameras, "cameras", "camera");
   const auto images = index_by_id<std::uint32_t>(model, model.images, "images", "image");
   const auto points = index_by_id<std::uint64_t>(model, model.points, "points3D", "point");
   check_tracks(model, images);
-  check_rigs(model);
   GraphFile file;
   FactorGraph& graph = file.graph;
   for (const ColmapCamera& camera : model.cameras) {
@@ -158,6 +173,7 @@ GraphFile to_graph(const ColmapModel& model) {
     file.point_ids.push_back(point.id);
   }
   add_observations(model, points, graph);
+  add_rigs(model, graph);
   return file;
 }
 
@@ -204,20 +220,19 @@ fs::path write_colmap(ColmapModel model, const FactorGraph& graph, const fs::pat
 
 GraphFile read_colmap(const fs::path& folder, ColmapVariant variant) {
   const bool is_text = variant == ColmapVariant::kText;
-  const auto model = std::make_shared<const ColmapModel>(is_text ? read_colmap_text(folder)
-                                                                 : read_colmap_binary(folder));
+  const auto model = std::make_shared<ColmapModel>(is_text ? read_colmap_text(folder)
+                                                           : read_colmap_binary(folder));
+  check_rigs(*model);
+  std::vector<std::string> warnings = apply_rigs(*model);
   GraphFile file = to_graph(*model);
-  if (joins_images(*model)) {
-    file.warnings.emplace_back(
-        "rigs join several images; the images are optimised and written each on its own");
-  }
+  file.warnings = std::move(warnings);
   const auto add_writer = [&](ColmapVariant written) {
     const GraphFormat format =
         written == ColmapVariant::kText ? GraphFormat::kColmapText : GraphFormat::kColmapBinary;
-    file.writers.push_back(
-        {format, [model, written](const FactorGraph& graph, const fs::path& out) {
-           return write_colmap(*model, graph, out, written);
-         }});
+    file.writers.push_back({format, [model = std::shared_ptr<const ColmapModel>(model), written](
+                                        const FactorGraph& graph, const fs::path& out) {
+                              return write_colmap(*model, graph, out, written);
+                            }});
   };
   add_writer(variant);
   add_writer(is_text ? ColmapVariant::kBinary : ColmapVariant::kText);

@@ -12,8 +12,8 @@ namespace hybrid_slam {
 // by the images of a camera, but not the principal point.
 //
 // Written back: everything that was read, with poses, cameras, points, and the points' mean errors,
-// of the estimate. Images vary on their own: where a rig's frame holds several, a warning says so,
-// and each camera is written as a rig of its own.
+// of the estimate. Frames and rigs rule the images' poses, and images of one frame stay where they
+// are on its rig: see colmap_rigs.h.
 GraphFile read_colmap(const std::filesystem::path& folder, ColmapVariant variant);
 
 }  // namespace hybrid_slam

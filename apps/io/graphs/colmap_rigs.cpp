@@ -3,18 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <unordered_map>
 #include <unordered_set>
 
 namespace hybrid_slam {
 
 namespace {
-
-std::ptrdiff_t image_count(const ColmapFrame& frame) {
-  return std::count_if(frame.data.begin(), frame.data.end(), [](const ColmapFrameData& data) {
-    return data.sensor.type == ColmapSensor::kCamera;
-  });
-}
 
 // Null if the rig has no such sensor.
 const ColmapRigSensor* find_other(const ColmapRig& rig, const ColmapSensor& sensor) {
@@ -40,31 +36,35 @@ RigsById rigs_by_id(const ColmapModel& model) {
   return rigs;
 }
 
-void replace_rigs(ColmapModel& model) {
-  model.rigs.clear();
-  model.frames.clear();
-  for (const ColmapCamera& camera : model.cameras) {
-    ColmapRig rig;
-    rig.id = camera.id;
-    rig.reference = ColmapSensor{ColmapSensor::kCamera, camera.id};
-    model.rigs.push_back(rig);
-  }
-  for (const ColmapImage& image : model.images) {
-    ColmapFrame frame;
-    frame.id = image.id;
-    frame.rig = image.camera;
-    frame.rig_from_world = image.cam_from_world;
-    frame.data.push_back({{ColmapSensor::kCamera, image.camera}, image.id});
-    model.frames.push_back(frame);
+// The pose of a sensor on its rig; none where the rig does not know it.
+std::optional<Rigid3d> sensor_from_rig(const ColmapRig& rig, const ColmapSensor& sensor) {
+  if (rig.reference == sensor) return Rigid3d();
+  const ColmapRigSensor* other = find_other(rig, sensor);
+  return other == nullptr ? std::nullopt : other->sensor_from_rig;
+}
+
+using ImagesById = std::unordered_map<std::uint64_t, std::uint32_t>;
+
+ImagesById images_by_id(const ColmapModel& model) {
+  ImagesById images;
+  for (std::uint32_t i = 0; i < model.images.size(); ++i) images.emplace(model.images[i].id, i);
+  return images;
+}
+
+// Calls visit(image's index, sensor_from_rig) for the images of a frame whose pose the rig knows.
+template <typename Visit>
+void visit_images(const ColmapFrame& frame, const RigsById& rigs, const ImagesById& images,
+                  const Visit& visit) {
+  for (const ColmapFrameData& data : frame.data) {
+    const auto image = images.find(data.id);
+    if (data.sensor.type != ColmapSensor::kCamera || image == images.end()) continue;
+    if (const auto pose = sensor_from_rig(*rigs.at(frame.rig), data.sensor)) {
+      visit(image->second, *pose);
+    }
   }
 }
 
 }  // namespace
-
-bool joins_images(const ColmapModel& model) {
-  return std::any_of(model.frames.begin(), model.frames.end(),
-                     [](const ColmapFrame& frame) { return image_count(frame) > 1; });
-}
 
 void check_rigs(const ColmapModel& model) {
   const RigsById rigs = rigs_by_id(model);
@@ -90,24 +90,65 @@ void check_rigs(const ColmapModel& model) {
   }
 }
 
-void update_rigs(ColmapModel& model) {
-  if (joins_images(model)) {
-    replace_rigs(model);
-    return;
-  }
+std::vector<std::string> apply_rigs(ColmapModel& model) {
+  constexpr double kRounding = 1e-5;  // [rad], and of the length of a translation
   const RigsById rigs = rigs_by_id(model);
-  std::unordered_map<std::uint64_t, const ColmapImage*> images;
-  for (const ColmapImage& image : model.images) images.emplace(image.id, &image);
-  for (ColmapFrame& frame : model.frames) {
-    for (const ColmapFrameData& data : frame.data) {
-      const auto image = images.find(data.id);
-      if (data.sensor.type != ColmapSensor::kCamera || image == images.end()) continue;
-      frame.rig_from_world = image->second->cam_from_world;
-      const ColmapRigSensor* other = find_other(*rigs.at(frame.rig), data.sensor);
-      if (other != nullptr && other->sensor_from_rig) {
-        frame.rig_from_world = inverse(*other->sensor_from_rig) * frame.rig_from_world;
+  const ImagesById images = images_by_id(model);
+  std::size_t contradicting = 0;
+  double worst_turn = 0;
+  double worst_shift = 0;
+  for (const ColmapFrame& frame : model.frames) {
+    visit_images(frame, rigs, images, [&](std::uint32_t i, const Rigid3d& from_rig) {
+      Rigid3d& pose = model.images[i].cam_from_world;
+      const Rigid3d ruling = from_rig * frame.rig_from_world;
+      const Rigid3d error = ruling * inverse(pose);
+      const double turn = 2 * Eigen::Quaterniond(error.rotation()).vec().norm();
+      const double shift = error.translation().norm();
+      if (turn > kRounding || shift > kRounding * (1 + ruling.translation().norm())) {
+        ++contradicting;
+        worst_turn = std::max(worst_turn, 2 * std::asin(std::min(1.0, turn / 2)));
+        worst_shift = std::max(worst_shift, shift);
       }
-    }
+      pose = ruling;
+    });
+  }
+  if (contradicting == 0) return {};
+  return {fmt::format(
+      "{}: poses of {} of {} images contradict those of {}, which rule (by up to {:.2g} degrees, "
+      "{:.2g} "
+      "in length)",
+      model.file("images").string(), contradicting, model.images.size(),
+      model.file("frames").filename().string(), worst_turn * 180 / std::numbers::pi, worst_shift)};
+}
+
+std::vector<ColmapRigidPair> rigid_pairs(const ColmapModel& model) {
+  const RigsById rigs = rigs_by_id(model);
+  const ImagesById images = images_by_id(model);
+  std::vector<ColmapRigidPair> pairs;
+  for (const ColmapFrame& frame : model.frames) {
+    std::optional<ColmapRigidPair> first;
+    visit_images(frame, rigs, images, [&](std::uint32_t i, const Rigid3d& from_rig) {
+      if (!first) {
+        first = ColmapRigidPair{i, i, from_rig};
+      } else {
+        pairs.push_back({first->a, i, first->a_from_b * inverse(from_rig)});
+      }
+    });
+  }
+  return pairs;
+}
+
+void update_rigs(ColmapModel& model) {
+  const RigsById rigs = rigs_by_id(model);
+  const ImagesById images = images_by_id(model);
+  for (ColmapFrame& frame : model.frames) {
+    bool is_first = true;
+    visit_images(frame, rigs, images, [&](std::uint32_t i, const Rigid3d& from_rig) {
+      Rigid3d& pose = model.images[i].cam_from_world;
+      if (is_first) frame.rig_from_world = inverse(from_rig) * pose;
+      if (!is_first) pose = from_rig * frame.rig_from_world;
+      is_first = false;
+    });
   }
 }
 

@@ -27,6 +27,7 @@ GraphFile read_graph_file(const fs::path& path) {
   if (is_map_file(path) || path.extension() == ".hslam") return read_map_graph(path);
   TextScanner in(path);
   if (!in.more()) throw InputError(path.string() + ": is empty");
+  if (has_decimal_commas(in.whole_line())) in.fail("decimal commas; write numbers with a point");
   const std::string first(in.field("first field"));
   std::size_t fields = 1;
   bool whole_numbers = is_whole_number(first);

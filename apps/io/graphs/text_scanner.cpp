@@ -15,7 +15,7 @@ constexpr std::string_view kSeparators = " \t\r,\n";
 }  // namespace
 
 TextScanner::TextScanner(std::filesystem::path path)
-    : path_(std::move(path)), text_(read_file(path_)) {}
+    : path_(std::move(path)), text_(read_text_file(path_)) {}
 
 bool TextScanner::more_on_line() {
   at_ = std::min(text_.find_first_not_of(kBlanks, at_), text_.size());
@@ -36,7 +36,7 @@ bool TextScanner::next_line() {
     at_ = text_.size();
     return false;
   }
-  at_ = end + 1;
+  at_ = line_begin_ = end + 1;
   ++line_;
   line_is_untouched_ = true;
   return true;
@@ -74,6 +74,13 @@ bool TextScanner::skip_field(std::string_view expected) {
   at_ = end;
   line_is_untouched_ = false;
   return true;
+}
+
+std::string_view TextScanner::whole_line() const {
+  const std::size_t begin = std::min(text_.find_first_not_of(kBlanks, line_begin_), text_.size());
+  const std::size_t end = std::min(text_.find('\n', begin), text_.size());
+  const std::string_view line = std::string_view(text_).substr(begin, end - begin);
+  return line.substr(0, line.find_last_not_of(kBlanks) + 1);
 }
 
 std::string_view TextScanner::rest_of_line() {

@@ -30,6 +30,8 @@ class TextScanner {
   std::uint64_t integer(std::string_view what, std::uint64_t max = UINT64_MAX);
   // Passes over the next field on this line if it is this one.
   bool skip_field(std::string_view expected);
+  // All of this line, as it stands there, without blanks around it.
+  std::string_view whole_line() const;
   // What remains of the line, without blanks around it.
   std::string_view rest_of_line();
 
@@ -49,6 +51,7 @@ class TextScanner {
   std::filesystem::path path_;
   std::string text_;
   std::size_t at_ = 0;
+  std::size_t line_begin_ = 0;
   int line_ = 1;
   bool line_is_untouched_ = true;  // no field of it was read
 };

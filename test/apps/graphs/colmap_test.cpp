@@ -5,7 +5,9 @@
 
 #include <catch2/catch.hpp>
 
+#include "backend/problem/solve_graph.h"
 #include "test/apps/graphs/graph_checks.h"
+#include "test/support/shared_cases.h"
 #include "test/support/temp_folder.h"
 
 namespace hybrid_slam {
@@ -173,21 +175,58 @@ TEST_CASE("COLMAP: the frames of rigs follow their images") {
   CHECK(model.frames[4].rig_from_world.translation().isApprox(Eigen::Vector3d(6.5, 8, 9), 1e-14));
 }
 
-TEST_CASE("COLMAP: images that a rig joins are taken apart, with a warning") {
+TEST_CASE("COLMAP: images that a rig joins stay rigid, and frames rule over images") {
   const TempFolder folder;
   TextFiles files = with_rigs();
   files["rigs.txt"] = "1 2 CAMERA 4 CAMERA 2 1 1 0 0 0 -0.5 0.25 0.125\n";
   files["frames.txt"] = "1 1 1 0 0 0 0 0 0 2 CAMERA 4 12 CAMERA 2 6\n";
   write_files(folder.path() / "input", files);
   const GraphFile file = read_graph(folder.path() / "input");
-  CHECK(file.warnings.size() == 1);
+  CHECK(file.warnings.empty());
+  REQUIRE(file.graph.edges.size() == 1);
+  CHECK(file.graph.edges[0].a == 0);
+  CHECK(file.graph.edges[0].b == 2);
   const ColmapModel model = read_colmap_text(file.writers[0].write(file.graph, folder.path()));
-  CHECK(model.rigs.size() == 5);
-  REQUIRE(model.frames.size() == 5);
-  CHECK(model.frames[2].rig == 2);
-  REQUIRE(model.frames[2].data.size() == 1);
-  CHECK(model.frames[2].data[0].id == 6);
-  CHECK(model.frames[2].rig_from_world.params == model.images[2].cam_from_world.params);
+  REQUIRE(model.rigs.size() == 1);
+  REQUIRE(model.frames.size() == 1);
+  CHECK(model.images[2].cam_from_world.params == file.graph.frames[2].cam_from_world.params);
+
+  files["frames.txt"] = "1 1 1 0 0 0 0 0 2 2 CAMERA 4 12 CAMERA 2 6\n";
+  write_files(folder.path() / "stale", files);
+  const GraphFile stale = read_graph(folder.path() / "stale");
+  REQUIRE(stale.warnings.size() == 1);
+  CHECK(stale.warnings[0].find("images.txt: poses of 2 of 5 images contradict those of frames.txt, "
+                               "which rule (by up to 0 degrees, 2 in length)") !=
+        std::string::npos);
+  CHECK(stale.graph.frames[0].cam_from_world.translation() == Eigen::Vector3d(0, 0, 2));
+  CHECK(stale.graph.frames[2].cam_from_world.translation() == Eigen::Vector3d(-0.5, 0.25, 2.125));
+}
+
+TEST_CASE("COLMAP: a stale model of the cases is the consistent one") {
+  const auto cases = shared_cases("colmap");
+  if (!cases) return;
+  const GraphFile consistent = read_graph(*cases / "consistent");
+  const GraphFile stale = read_graph(*cases / "stale");
+  CHECK(consistent.warnings.empty());
+  REQUIRE(stale.warnings.size() == 1);
+  CHECK(stale.warnings[0].find("of 10 images contradict") != std::string::npos);
+  CHECK(cost(consistent.graph) == Approx(53.08).epsilon(1e-3));
+  CHECK(cost(stale.graph) == Approx(cost(consistent.graph)).epsilon(1e-9));
+  // Solved, the pair is as far apart as before.
+  FactorGraph solved = stale.graph;
+  ProblemOptions options;
+  options.rounds.assign(1, {50, Loss::kNone, 1e-10});
+  const GraphSummary summary = solve_graph(solved, options);
+  CHECK(summary.final_cost < 0.99 * summary.initial_cost);
+  const TempFolder folder;
+  const GraphFile again = read_graph(stale.writers[0].write(solved, folder.path()));
+  CHECK(again.warnings.empty());
+  const auto& frames = again.graph.frames;
+  for (const GraphEdge& edge : stale.graph.edges) {
+    const Rigid3d moved = frames[edge.a].cam_from_world * inverse(frames[edge.b].cam_from_world);
+    CHECK((moved.translation() - edge.a_from_b.translation()).norm() < 1e-12);
+  }
+  CHECK(cost(again.graph) == Approx(summary.final_cost).epsilon(1e-4));
 }
 
 TEST_CASE("COLMAP text: what is refused") {

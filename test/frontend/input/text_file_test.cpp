@@ -38,18 +38,29 @@ TEST_CASE("what is no finite number is refused with its line") {
 TEST_CASE("times ascend strictly, one per line") {
   const TempFolder folder;
   const auto path = folder.path() / "times.txt";
+  std::vector<std::string> warnings;
   write_text(path, "0\n0.1\n0.25\n");
-  CHECK(read_times(path) == std::vector<double>{0, 0.1, 0.25});
+  CHECK(read_times(path, warnings) == std::vector<double>{0, 0.1, 0.25});
   write_text(path, "0\n0.1\n0.1\n");
-  CHECK(complaint([&] { read_times(path); }).find(":3: times are not strictly ascending") !=
-        std::string::npos);
+  CHECK(complaint([&] {
+          read_times(path, warnings);
+        }).find(":3: times are not strictly ascending") != std::string::npos);
   write_text(path, "0\n0.2\n0.1\n");
-  CHECK(complaint([&] { read_times(path); }).find(":3: ") != std::string::npos);
+  CHECK(complaint([&] { read_times(path, warnings); }).find(":3: ") != std::string::npos);
   write_text(path, "0\n0.2 7\n");
-  CHECK(complaint([&] { read_times(path); }).find(":2: ") != std::string::npos);
+  CHECK(complaint([&] { read_times(path, warnings); }).find(":2: ") != std::string::npos);
   write_text(path, "# nothing\n");
-  CHECK(complaint([&] { read_times(path); }).find("no times") != std::string::npos);
-  CHECK(complaint([&] { read_times(folder.path()); }).find("cannot be read") != std::string::npos);
+  CHECK(complaint([&] { read_times(path, warnings); }).find("no times") != std::string::npos);
+  CHECK(complaint([&] { read_times(folder.path(), warnings); }).find("cannot be read") !=
+        std::string::npos);
+  CHECK(warnings.empty());
+  write_text(path, "1403636579000000000\n1403636579050000000\n");
+  const std::vector<double> times = read_times(path, warnings);
+  REQUIRE(times.size() == 2);
+  CHECK(times[1] - times[0] == Approx(0.05).margin(1e-6));
+  REQUIRE(warnings.size() == 1);
+  INFO(warnings[0]);
+  CHECK(warnings[0].find("read as nanoseconds: 140363657") != std::string::npos);
 }
 
 }  // namespace
