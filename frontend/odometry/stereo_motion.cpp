@@ -7,8 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include <Eigen/LU>
-
+#include "frontend/odometry/stereo_motion_covariance.h"
 #include "frontend/pose/damped_gauss_newton.h"
 #include "frontend/pose/random_sampler.h"
 #include "frontend/pose/rigid_alignment.h"
@@ -18,8 +17,7 @@ namespace {
 
 constexpr double kHypothesisConverged = 1e-6;  // step [m, rad]
 constexpr GaussNewtonStop kRefinementStop{100, 1e-8};
-constexpr double kLeastVariance = 1e-6;  // [px^2]: no measurement is perfect
-constexpr int kMaxRefinements = 5;       // inliers are chosen anew before each
+constexpr int kMaxRefinements = 5;  // inliers are chosen anew before each
 
 class StereoMotionSolver {
  public:
@@ -40,7 +38,14 @@ class StereoMotionSolver {
     if (!motion) return std::nullopt;
     std::vector<int> inliers = find_inliers(*motion);
     if (static_cast<int>(inliers.size()) < options_.min_inliers) return std::nullopt;
-    const std::optional<Matrix6d> covariance = covariance_of(*motion, inliers);
+    std::vector<StereoSight> sights;
+    for (const int i : inliers) {
+      const Point& p = points_[static_cast<std::size_t>(i)];
+      sights.push_back(
+          {p.in_previous, p.measured, p.squared_weight, p.previous_variance, p.current_variance});
+    }
+    const std::optional<Matrix6d> covariance =
+        stereo_motion_covariance(params_, *motion, sights, options_.inlier_threshold);
     if (!covariance) return std::nullopt;
     StereoMotionSolution solution{*motion, *covariance, std::move(inliers)};
     for (int& i : solution.inliers) i = points_[static_cast<std::size_t>(i)].index;
@@ -54,6 +59,8 @@ class StereoMotionSolver {
     Eigen::Vector3d in_current;   // the same; not finite where the disparity allows none
     Eigen::Vector4d measured;     // (u_left, v_left, u_right, v_right) in the current frame
     double squared_weight;
+    double previous_variance;
+    double current_variance;
   };
 
   int size() const { return static_cast<int>(points_.size()); }
@@ -65,7 +72,8 @@ class StereoMotionSolver {
     if (!in_previous || !in_current) return;
     const double cu = std::max(std::abs(params_[2]), 1.0);
     const double weight = 1 / (std::abs(c.current[0] - params_[2]) / cu + 0.05);
-    points_.push_back({index, *in_previous, *in_current, c.current, weight * weight});
+    points_.push_back({index, *in_previous, *in_current, c.current, weight * weight,
+                       c.previous_sigma * c.previous_sigma, c.current_sigma * c.current_sigma});
   }
 
   // One row per coordinate in single precision: a hypothesis is scored against all points by
@@ -175,104 +183,6 @@ class StereoMotionSolver {
       best = motion;
     }
     return best;
-  }
-
-  // A point's residual at the motion, in the terms of its noise: along the row, across it,
-  // disparity.
-  struct NoisyResidual {
-    Eigen::Matrix<double, 3, 6> by_motion;
-    Eigen::Matrix3d by_previous;  // by what was measured in the previous frame
-    Eigen::Vector3d residual;
-    Eigen::Matrix3d weight;  // that it has in minimize()
-  };
-
-  NoisyResidual noisy_residual(const Rigid3d& motion, const Point& p) const {
-    // (u_left, v, u_right) -> (their mean, v, disparity).
-    const Eigen::Matrix3d terms{{0.5, 0, 0.5}, {0, 1, 0}, {1, 0, -1}};
-    const Eigen::Matrix3d measured_from_terms = terms.inverse();
-    const Eigen::Vector3d point = motion * p.in_previous;
-    Eigen::Vector3d m = Eigen::Vector3d::Zero();  // all inliers project
-    Eigen::Vector3d m_previous;
-    Eigen::Matrix<double, 3, 3, Eigen::RowMajor> d_point = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 3, Eigen::RowMajor> d_previous = Eigen::Matrix3d::Identity();
-    RectifiedStereo::project_with_jacobians(params_.data(), point.data(), m.data(), d_point.data(),
-                                            nullptr);
-    RectifiedStereo::project_with_jacobians(params_.data(), p.in_previous.data(), m_previous.data(),
-                                            d_previous.data(), nullptr);
-    const double v = 0.5 * (p.measured[1] + p.measured[3]);
-    const Eigen::Vector3d squared_weight(p.squared_weight, 2 * p.squared_weight, p.squared_weight);
-    return {terms * pose_jacobian<3>(d_point, point),
-            terms * d_point * motion.rotation().toRotationMatrix() * d_previous.inverse() *
-                measured_from_terms,
-            terms * Eigen::Vector3d(m[0] - p.measured[0], m[1] - v, m[2] - p.measured[2]),
-            measured_from_terms.transpose() * squared_weight.asDiagonal() * measured_from_terms};
-  }
-
-  // The weights of minimize() are not those of the noise, hence both sides (a sandwich):
-  //   H^-1 (sum J^T W C W J) H^-1,  H = sum J^T W J,  C the covariance of a residual.
-  // C is linear in the three variances, and these explain the squares of the residuals, of which
-  // the motion that was fitted has taken its part. None if the inliers leave the motion open.
-  std::optional<Matrix6d> covariance_of(const Rigid3d& motion, std::span<const int> inliers) const {
-    std::vector<NoisyResidual> points;
-    Matrix6d information = Matrix6d::Zero();
-    Eigen::Vector3d squares = Eigen::Vector3d::Zero();
-    for (const int i : inliers) {
-      points.push_back(noisy_residual(motion, points_[static_cast<std::size_t>(i)]));
-      const NoisyResidual& point = points.back();
-      information += point.by_motion.transpose() * point.weight * point.by_motion;
-      squares += point.residual.cwiseAbs2();
-    }
-    if (!is_determined<6>(information)) return std::nullopt;
-    const Matrix6d inverse = information.inverse();
-    std::array<Matrix6d, 3> by_variance;  // of the motion
-    Eigen::Matrix3d expected;             // squares, by variance
-    for (int k = 0; k < 3; ++k) {
-      by_variance[static_cast<std::size_t>(k)] = spread_by(k, points, inverse);
-      expected.col(k) = squares_by(k, points, inverse, by_variance[static_cast<std::size_t>(k)]);
-    }
-    Eigen::Vector3d variance = expected.partialPivLu().solve(squares);
-    if (!(variance.minCoeff() > 0)) variance = squares.cwiseQuotient(expected.rowwise().sum());
-    // 1 / variance, by which errors are normalised, is too large on average.
-    const double freedom = 3.0 * static_cast<double>(points.size()) - 6;
-    variance = (variance * freedom / std::max(freedom - 2, 1.0)).cwiseMax(kLeastVariance);
-    Matrix6d covariance = Matrix6d::Zero();
-    for (int k = 0; k < 3; ++k) {
-      covariance += variance[k] * by_variance[static_cast<std::size_t>(k)];
-    }
-    if (!is_determined<6>(covariance)) return std::nullopt;
-    return Matrix6d(0.5 * (covariance + covariance.transpose()));
-  }
-
-  // A residual's covariance by one of the variances.
-  static Eigen::Matrix3d noise_by(int k, const NoisyResidual& point) {
-    Eigen::Matrix3d noise = point.by_previous.col(k) * point.by_previous.col(k).transpose();
-    noise(k, k) += 1;
-    return noise;
-  }
-
-  // The covariance of the motion by one of them.
-  static Matrix6d spread_by(int k, const std::vector<NoisyResidual>& points,
-                            const Matrix6d& inverse) {
-    Matrix6d spread = Matrix6d::Zero();
-    for (const NoisyResidual& point : points) {
-      const Eigen::Matrix<double, 3, 6> weighted = point.weight * point.by_motion;
-      spread += weighted.transpose() * noise_by(k, point) * weighted;
-    }
-    return inverse * spread * inverse;
-  }
-
-  // The squares of the residuals, summed, that one of them gives, on average.
-  static Eigen::Vector3d squares_by(int k, const std::vector<NoisyResidual>& points,
-                                    const Matrix6d& inverse, const Matrix6d& spread) {
-    Eigen::Vector3d squares = Eigen::Vector3d::Zero();
-    for (const NoisyResidual& point : points) {
-      const Eigen::Matrix3d noise = noise_by(k, point);
-      const Eigen::Matrix3d fitted =
-          point.by_motion * inverse * (point.weight * point.by_motion).transpose() * noise;
-      squares +=
-          (noise - 2 * fitted + point.by_motion * spread * point.by_motion.transpose()).diagonal();
-    }
-    return squares;
   }
 
   std::optional<Rigid3d> refine(Rigid3d motion) const {

@@ -28,13 +28,16 @@ struct StereoOdometerOptions {
 struct StereoCorrespondence {
   Eigen::Vector3d previous;  // (u_left, v, u_right) [px]
   Eigen::Vector4d current;   // (u_left, v_left, u_right, v_right) [px]
+  // Standard deviations of the coordinates, as far as they differ between points: of all points
+  // together the residuals tell [px].
+  double previous_sigma = 1;
+  double current_sigma = 1;
 };
 
 struct StereoMotionSolution {
   Rigid3d current_from_previous;
-  // Of its left perturbation (translation, rotation). The noise is that of the inliers' residuals,
-  // one variance each of the place along the row, across it and of the disparity, alike in both
-  // frames. First order; what all matches are off by in common is not in it.
+  // Of its left perturbation (translation, rotation): stereo_motion_covariance(). First order; what
+  // all matches are off by in common is not in it.
   Matrix6d covariance;
   std::vector<int> inliers;  // indices of correspondences, ascending
 };

@@ -14,7 +14,10 @@ StereoCorrespondence correspondence(const StereoFeatures& previous, const Stereo
   const int right = current.right_of_left[j];
   const float v_right =
       right >= 0 ? current.right.keypoints[static_cast<std::size_t>(right)].y : left.y;
-  return {{before.x, before.y, previous.u_right[i]}, {left.x, left.y, current.u_right[j], v_right}};
+  return {{before.x, before.y, previous.u_right[i]},
+          {left.x, left.y, current.u_right[j], v_right},
+          before.sigma,
+          left.sigma};
 }
 
 }  // namespace

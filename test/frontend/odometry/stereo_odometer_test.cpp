@@ -6,11 +6,16 @@
 #include <iostream>
 #include <memory>
 
+#include <Eigen/Cholesky>
+
 #include <catch2/catch.hpp>
 
+#include "cameras/geometry/se3.h"
 #include "frontend/features/sift.h"
 #include "frontend/input/image_sequence.h"
 #include "test/frontend/pose/pose_scene.h"
+#include "test/support/stereo_frame.h"
+#include "test/support/synthetic_scene.h"
 
 namespace hybrid_slam {
 namespace {
@@ -99,6 +104,53 @@ TEST_CASE("stereo odometer gives up on frames without features", "[odometry]") {
   const StereoOdometer odometer(pose_scene::stereo(), {});
   CHECK_FALSE(odometer.estimate({}, {}));
   CHECK_THROWS_AS(StereoOdometer(pose_scene::stereo(), {.min_inliers = 1}), std::invalid_argument);
+}
+
+// Mean normalised squared error per degree of freedom of one motion per scene, over 60 scenes: 1
+// with a standard deviation of 0.075.
+double mean_normalized_error(SyntheticSceneOptions scene_options) {
+  constexpr int kRuns = 60;
+  scene_options.times = 5;
+  double sum = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    scene_options.seed = static_cast<std::uint64_t>(100 + run);
+    const SyntheticScene scene = make_synthetic_scene(scene_options);
+    const StereoOdometer odometer(std::get<Calibrated<RectifiedStereo>>(scene.cameras[0]), {});
+    const SyntheticFrame& previous = scene.frames[3];
+    const SyntheticFrame& current = scene.frames[4];
+    const auto motion = odometer.estimate(stereo_features(*previous.observations),
+                                          stereo_features(*current.observations));
+    REQUIRE(motion);
+    const Rigid3d truth = current.cam_from_world * inverse(previous.cam_from_world);
+    const Vector6d off = se3_log(truth * inverse(motion->current_from_previous));
+    sum += off.dot(motion->covariance.ldlt().solve(off)) / 6;
+  }
+  return sum / kRuns;
+}
+
+TEST_CASE("A motion is off by what its covariance says where coarse keypoints are less certain") {
+  struct Case {
+    SceneTrajectory trajectory;
+    int landmarks;
+    double noise;
+  };
+  // With one variance for all keypoints and nothing said of the threshold: 1.4 to 3.2.
+  for (const Case& c :
+       {Case{SceneTrajectory::kCorridor, 300, 0.1}, Case{SceneTrajectory::kCorridor, 300, 0.25},
+        Case{SceneTrajectory::kCorridor, 2000, 0.1}, Case{SceneTrajectory::kCorridor, 2000, 0.25},
+        Case{SceneTrajectory::kHover, 300, 0.1}, Case{SceneTrajectory::kHover, 2000, 0.1},
+        Case{SceneTrajectory::kHover, 2000, 0.25}}) {
+    SyntheticSceneOptions options;
+    options.trajectory = c.trajectory;
+    options.landmarks = c.landmarks;
+    options.noise = c.noise;
+    options.clutter = 50;
+    INFO("trajectory " << static_cast<int>(c.trajectory) << ", " << c.landmarks
+                       << " landmarks, noise " << c.noise);
+    const double mean = mean_normalized_error(options);
+    CHECK(mean > 0.8);
+    CHECK(mean < 1.35);
+  }
 }
 
 }  // namespace
