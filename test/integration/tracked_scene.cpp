@@ -22,7 +22,10 @@ class Mapping {
   }
 
   void add(const TrackedFrame& frame) {
-    backend_.apply(frame.counts);
+    MapEdit counts;
+    for (const LandmarkId id : frame.counts.visible) counts.counted.push_back({id, 1, 0});
+    for (const LandmarkId id : frame.counts.found) counts.counted.push_back({id, 0, 1});
+    backend_.apply(counts);
     if (!frame.keyframe) return;
     const KeyframeId id = backend_.add(*frame.keyframe);
     backend_.apply(probation_.cull(backend_.view(), id));
