@@ -165,11 +165,14 @@ void Diagnosis::look_at_features(const CameraFrame& frame, Found& found) {
   }
 }
 
-// Not every pair is looked at; what was found last holds.
+// Pairs that hardly match are all looked at, so those that are swapped are among them. Of the
+// others not every one is, and the rows that were found last hold.
 void Diagnosis::look_at_pair(const CameraFrame& frame, Found& found) {
   if (frame.evidence.pair) pair_ = frame.evidence.pair;
+  if (frame.evidence.pair && is_swapped(*pair_)) {
+    found.push_back({Cause::kSwapped, pair_->reversed});
+  }
   if (!pair_) return;
-  if (is_swapped(*pair_)) found.push_back({Cause::kSwapped, pair_->reversed});
   if (has_row_error(*pair_)) found.push_back({Cause::kCalibrationDoubtful, pair_->row_error});
 }
 

@@ -20,9 +20,9 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr double kMaxAte = 0.003;  // [m]; the path is 1.6 m long, the ground 2 m away
-constexpr const char* kResults[] = {"stereo.tum",  "stereo_online.tum", "map.hslam",
-                                    "map.ply",     "map.png",           "loops.csv",
-                                    "timing.json", "timing.csv",        "summary.json"};
+constexpr const char* kResults[] = {
+    "stereo.tum", "stereo_online.tum", "map.hslam",  "map.ply",      "map.png",
+    "loops.csv",  "timing.json",       "timing.csv", "summary.json", "frames.csv"};
 
 std::string engine_by_default() {
   return to_string(why_no_cuda_sift({}).empty() ? SiftDevice::kCuda : SiftDevice::kCpu);
@@ -31,7 +31,8 @@ std::string engine_by_default() {
 void check_frames(const Json& summary, int read, int tracked, int corrupt = 0) {
   INFO(summary.dump(1));
   const Json& frames = summary["frames"];
-  CHECK(frames.size() == 5);
+  CHECK(frames.size() == 6);
+  CHECK(frames["other_components"] == 0);
   CHECK(frames["read"] == read);
   CHECK(frames["tracked"] == tracked);
   CHECK(frames["lost"] == read - tracked - corrupt);

@@ -264,8 +264,8 @@ TEST_CASE("map_optimizer: bad usage ends with code 2") {
 TEST_CASE("map_optimizer: bad input ends with code 3 and one line, before anything is written") {
   const TempFolder folder;
   check_refused(run_optimizer(folder, {"nowhere"}), 3, "nowhere: no such file");
-  write_text(folder.path() / "plane.g2o", "VERTEX_SE2 0 0 0 0\n");
-  check_refused(run_optimizer(folder, {"plane.g2o"}), 3, "plane.g2o:1: \"VERTEX_SE2\" is not");
+  write_text(folder.path() / "odd.g2o", "VERTEX_SE5 0 0 0 0\n");
+  check_refused(run_optimizer(folder, {"odd.g2o"}), 3, "odd.g2o:1: \"VERTEX_SE5\" is not");
   write_text(folder.path() / "line.txt", "some text\n");
   check_refused(run_optimizer(folder, {"line.txt"}), 3, "line.txt:1: \"some\" begins no kind");
   write_bal(folder.path() / "in.txt", exact_problem());
