@@ -147,11 +147,9 @@ Json fisheye_json(const RunResult& result, const RunSummary& summary) {
   const FrameCounts& frames = result.fisheye_frames;
   const MapPositions found = fisheye_positions(*result.map);
   Json json;
-  json["frames"] = {{"read", frames.read},
-                    {"registered", frames.tracked},
-                    {"other_components", frames.other_components},
-                    {"lost", frames.lost},
-                    {"missing", frames.corrupt}};
+  json["frames"] = {{"read", frames.read},       {"registered", frames.tracked},
+                    {"coasted", frames.coasted}, {"other_components", frames.other_components},
+                    {"lost", frames.lost},       {"missing", frames.corrupt}};
   json["poses_from"] = count_by(result.fisheye_records,
                                 [](const RecordedFrame& frame) { return to_string(frame.source); });
   add_conditions(json, result.fisheye_conditions);
@@ -174,11 +172,9 @@ Json summary_json(const CommandLine& line, const SequenceInfo& sequence, const R
   Json json;
   json["sequence"] = sequence.name;
   json["layout"] = sequence.layout;
-  json["frames"] = {{"read", frames.read},
-                    {"tracked", frames.tracked},
-                    {"other_components", frames.other_components},
-                    {"lost", frames.lost},
-                    {"dropped", frames.dropped},
+  json["frames"] = {{"read", frames.read},       {"tracked", frames.tracked},
+                    {"coasted", frames.coasted}, {"other_components", frames.other_components},
+                    {"lost", frames.lost},       {"dropped", frames.dropped},
                     {"corrupt", frames.corrupt}};
   json["poses_from"] =
       count_by(result.records, [](const RecordedFrame& frame) { return to_string(frame.source); });
@@ -255,6 +251,7 @@ void print_summary(const CommandLine& line, const RunResult& result, const RunSu
   const FrameCounts& frames = result.frames;
   fmt::print("frames     {} read, {} tracked, {} lost, {} dropped, {} corrupt\n", frames.read,
              frames.tracked, frames.lost, frames.dropped, frames.corrupt);
+  if (frames.coasted > 0) fmt::print("coasted    {} frames\n", frames.coasted);
   if (summary.hybrid || result.fisheye_frames.read > 0) {
     const FrameCounts& fisheye = result.fisheye_frames;
     fmt::print("fisheye    {} read, {} registered, {} lost, {} missing\n", fisheye.read,

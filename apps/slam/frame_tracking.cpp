@@ -35,6 +35,7 @@ TrackingState state_of(const TrackedFrame& tracked, const MapSnapshot& map) {
       return TrackingState::kOdometry;
     case PoseSource::kRelocalization:
       return TrackingState::kRelocalised;
+    case PoseSource::kCoasted:
     case PoseSource::kNone:
       break;
   }

@@ -85,7 +85,7 @@ void Recorder::tracked(const FrameResult& frame) {
   FrameCounts& counts = stereo ? result_.frames : result_.fisheye_frames;
   auto& records = stereo ? result_.records : result_.fisheye_records;
   ++counts.read;
-  ++(frame.has_pose() ? counts.tracked : counts.lost);
+  ++(frame.has_pose() ? counts.tracked : frame.tracked.coasted() ? counts.coasted : counts.lost);
   record_of_frame_[{frame.camera, frame.index}] = records.size();
   records.push_back({recorded(frame.tracked), std::nullopt, 0});
   FrameConditions& conditions = stereo ? result_.conditions : result_.fisheye_conditions;

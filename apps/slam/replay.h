@@ -66,6 +66,7 @@ struct FrameCounts {
   int read = 0;              // handed to the session, corrupt ones included
   int tracked = 0;           // in the component that holds most of the frames at the end
   int other_components = 0;  // in others
+  int coasted = 0;           // gone through without a look at the world
   int lost = 0;              // the map not yet begun included
   int dropped = 0;
   int corrupt = 0;
@@ -83,7 +84,7 @@ struct RecordedFrame {
   double disparity_offset = 0;
   double shading = 0;
 
-  bool tracked() const { return source != PoseSource::kNone; }
+  bool tracked() const { return source != PoseSource::kNone && source != PoseSource::kCoasted; }
 };
 
 // What stays of a tracked frame.

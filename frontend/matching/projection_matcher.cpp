@@ -153,4 +153,21 @@ std::vector<ProjectionMatch> match_predictions(const MapSnapshot& map, const Fea
   return of_keypoint;
 }
 
+double accidental_match_rate(const MapSnapshot& map, const FeatureView& view,
+                             std::span<const LandmarkPrediction> predictions,
+                             const ProjectionMatcherOptions& options) {
+  constexpr std::size_t kPairs = 256;
+  constexpr std::size_t kStride = 7919;  // a prime: neighbours in the lists are no pairs
+  const int max_distance = to_squared_bytes(options.max_descriptor_distance);
+  const std::size_t keypoints = view.features.size();
+  if (predictions.empty() || keypoints == 0) return 1;
+  int passed = 1;
+  for (std::size_t k = 0; k < kPairs; ++k) {
+    const LandmarkId id = predictions[k * predictions.size() / kPairs].id;
+    const Descriptor& other = view.features.descriptors[(k + 1) * kStride % keypoints];
+    passed += squared_distance(map.at(id).descriptor, other) <= max_distance ? 1 : 0;
+  }
+  return static_cast<double>(passed) / (kPairs + 1);
+}
+
 }  // namespace hybrid_slam

@@ -64,4 +64,11 @@ std::vector<ProjectionMatch> match_predictions(const MapSnapshot& map, const Fea
                                                const std::vector<char>* taken,
                                                const ProjectionMatcherOptions& options);
 
+// How often the descriptors of a landmark and of a keypoint that have nothing to do with one
+// another are near enough for a match: counted among some hundred arbitrary pairs, at least one of
+// which counts. What the ratio and the scale reject besides is not in it.
+double accidental_match_rate(const MapSnapshot& map, const FeatureView& view,
+                             std::span<const LandmarkPrediction> predictions,
+                             const ProjectionMatcherOptions& options);
+
 }  // namespace hybrid_slam

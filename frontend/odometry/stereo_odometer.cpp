@@ -1,6 +1,7 @@
 #include "frontend/odometry/stereo_odometer.h"
 
 #include <stdexcept>
+#include <utility>
 
 namespace hybrid_slam {
 namespace {
@@ -46,7 +47,25 @@ std::optional<StereoMotion> StereoOdometer::estimate(const StereoFeatures& previ
   for (const int i : solution->inliers) {
     motion.inliers.push_back(matches[static_cast<std::size_t>(i)]);
   }
+  motion.support = support(motion, previous);
   return motion;
+}
+
+PoseSupport StereoOdometer::support(const StereoMotion& motion,
+                                    const StereoFeatures& previous) const {
+  std::vector<double> depths;
+  for (const CircularMatch& match : motion.inliers) {
+    const auto i = static_cast<std::size_t>(match.previous);
+    const Keypoint& before = previous.left.keypoints[i];
+    const auto point = triangulate_stereo(camera_, {before.x, before.y, previous.u_right[i]});
+    if (point) depths.push_back(point->norm());
+  }
+  const double area = static_cast<double>(camera_.width) * camera_.height;
+  return {.candidates = motion.matches,
+          .inliers = static_cast<int>(motion.inliers.size()),
+          .chance = chance_in_area(options_.inlier_threshold, 1, area),
+          .covariance = motion.covariance,
+          .depth = median_of(std::move(depths))};
 }
 
 }  // namespace hybrid_slam

@@ -8,6 +8,7 @@
 #include "frontend/matching/circular_matcher.h"
 #include "frontend/matching/stereo_matcher.h"
 #include "frontend/odometry/stereo_motion.h"
+#include "frontend/pose/pose_belief.h"
 
 namespace hybrid_slam {
 
@@ -15,7 +16,9 @@ struct StereoMotion {
   Rigid3d current_from_previous;
   Matrix6d covariance = Matrix6d::Zero();  // of its left perturbation: see StereoMotionSolution
   std::vector<CircularMatch> inliers;
-  int matches = 0;  // closed circles before RANSAC
+  int matches = 0;      // before RANSAC
+  int patches = 0;      // inliers that were followed as patches, and are no keypoints
+  PoseSupport support;  // what speaks for it
 };
 
 // Ego-motion between two successive stereo frames: circular matches, then solve_stereo_motion.
@@ -30,6 +33,8 @@ class StereoOdometer {
                                        const StereoFeatures& current) const;
 
  private:
+  PoseSupport support(const StereoMotion& motion, const StereoFeatures& previous) const;
+
   Calibrated<RectifiedStereo> camera_;
   StereoOdometerOptions options_;
 };

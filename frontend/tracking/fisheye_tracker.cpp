@@ -4,8 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <utility>
 
 #include "frontend/tracking/stereo_keyframe.h"
@@ -71,16 +69,15 @@ TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, Keyframe
   result.frame_index = frame.index;
   result.time = frame.time;
   if (matcher_.relocalize(map, candidates(map, stereo_reference), frame)) {
-    auto match = matcher_.match_local_map(map, valid_ids(frame.landmarks),
-                                          options_.min_local_map_inliers, frame);
+    auto match = matcher_.match_local_map(map, valid_ids(frame.landmarks), frame);
     if (match) {
       result.source = last_.tracked() ? PoseSource::kLocalMap : PoseSource::kRelocalization;
       result.cam_from_world = frame.cam_from_world;
       result.reference = match->reference;
       result.cam_from_reference =
           frame.cam_from_world * inverse(map.cam_from_world(match->reference));
-      result.inliers = match->inliers;
-      certain = is_certain(map, frame, match->information);
+      result.inliers = match->support.inliers;
+      certain = is_certain(match->support);
       result.counts = std::move(match->counts);
       uncertain_ = hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
                                                options_.pose);
@@ -119,15 +116,9 @@ std::vector<KeyframeId> FisheyeTracker::candidates(const MapSnapshot& map,
 // Whether the place is known well enough for what a keyframe is used for: landmarks at the distance
 // of those it shows are looked for within the local map's radius of where it predicts them. No
 // odometer holds it if it is not.
-bool FisheyeTracker::is_certain(const MapSnapshot& map, const Frame& frame,
-                                const Matrix6d& information) const {
-  const Matrix6d covariance = information.inverse();
-  if (!covariance.allFinite()) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> place(covariance.topLeftCorner<3, 3>(),
-                                                             Eigen::EigenvaluesOnly);
-  const double sigma = std::sqrt(place.eigenvalues()[2]);
-  const double at_radius = options_.local_map_radius * median_distance(map, frame) / focal_;
-  return kSigmas * sigma <= at_radius;
+bool FisheyeTracker::is_certain(const PoseSupport& support) const {
+  const double at_radius = options_.local_map_radius * support.depth / focal_;
+  return kSigmas * translation_sigma(support.covariance) <= at_radius;
 }
 
 bool FisheyeTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,

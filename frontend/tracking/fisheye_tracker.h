@@ -44,7 +44,7 @@ class FisheyeTracker {
 
  private:
   std::vector<KeyframeId> candidates(const MapSnapshot& map, KeyframeId stereo_reference) const;
-  bool is_certain(const MapSnapshot& map, const Frame& frame, const Matrix6d& information) const;
+  bool is_certain(const PoseSupport& support) const;
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
 
   CameraId camera_id_;

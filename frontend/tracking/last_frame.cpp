@@ -2,12 +2,18 @@
 
 #include <utility>
 
+#include "cameras/geometry/se3.h"
+
 namespace hybrid_slam {
+namespace {
+
+constexpr double kMaxSeconds = 1;    // for which a velocity holds; uncertain long before
+constexpr double kRemembered = 0.9;  // of the mean of accelerations, per step
+
+}  // namespace
 
 void LastFrame::follow(const MapSnapshot& map) {
-  const bool arrived = requested_ && map.newest_frame_index(camera_) >= *requested_;
-  if (!tracked_ || !frame_) {
-    if (arrived) requested_.reset();
+  if (!frame_) {
     return;
   }
   if (requested_) {
@@ -20,7 +26,9 @@ void LastFrame::follow(const MapSnapshot& map) {
       const bool has_all_features = keyframe->landmarks.size() == frame_->size();
       if (is_that && has_all_features) frame_->landmarks = keyframe->landmarks;
     }
-    if (arrived) requested_.reset();
+    if (map.newest_frame_index(camera_) >= *requested_) {
+      requested_.reset();
+    }
   }
   if (reference_.valid()) {
     frame_->cam_from_world = cam_from_reference_ * map.cam_from_world(reference_);
@@ -28,26 +36,62 @@ void LastFrame::follow(const MapSnapshot& map) {
 }
 
 void LastFrame::remember(Frame frame, const TrackedFrame& result) {
-  velocity_.reset();
-  if (result.tracked() && tracked_ && frame_) {
-    velocity_ = frame.cam_from_world * inverse(frame_->cam_from_world);
+  tracked_ = result.tracked();
+  if (!tracked_) return;
+  std::optional<Rigid3d> step;
+  const bool goes_on =
+      result.source != PoseSource::kRelocalization && result.source != PoseSource::kInitialization;
+  if (frame_ && goes_on) {
+    step = frame.cam_from_world * inverse(frame_->cam_from_world);
+    learn_motion(*step, frame.time - frame_->time);
+  } else {
+    velocity_.reset();
   }
   if (result.keyframe) {
     requested_ = frame.index;
     keyframe_frame_ = frame.index;
     keyframe_time_ = frame.time;
     cam_from_requested_ = Rigid3d();
-  } else if (cam_from_requested_ && velocity_) {
-    cam_from_requested_ = *velocity_ * *cam_from_requested_;
+  } else if (cam_from_requested_ && step) {
+    cam_from_requested_ = *step * *cam_from_requested_;
   } else {
     cam_from_requested_.reset();
   }
-  if (result.tracked()) {
-    reference_ = result.reference;
-    cam_from_reference_ = result.cam_from_reference;
-  }
-  tracked_ = result.tracked();
+  reference_ = result.reference;
+  cam_from_reference_ = result.cam_from_reference;
   frame_ = std::move(frame);
+}
+
+void LastFrame::learn_motion(const Rigid3d& step, double seconds) {
+  const std::optional<Vector6d> before = std::exchange(velocity_, std::nullopt);
+  if (!(seconds > 0)) return;
+  velocity_ = se3_log(step) / seconds;
+  if (before) {
+    const Vector6d acceleration = 2 * (*velocity_ - *before) / (step_seconds_ + seconds);
+    Vector6d squared;  // alike in all directions: few steps tell little of each
+    squared << Eigen::Vector3d::Constant(acceleration.head<3>().squaredNorm() / 3),
+        Eigen::Vector3d::Constant(acceleration.tail<3>().squaredNorm() / 3);
+    squared_acceleration_ =
+        squared_acceleration_
+            ? Vector6d(kRemembered * *squared_acceleration_ + (1 - kRemembered) * squared)
+            : squared;
+  }
+  step_seconds_ = seconds;
+}
+
+// The velocity is that of the middle of the last step.
+std::optional<UncertainMotion> LastFrame::constant_velocity(double time) const {
+  if (!frame_ || !velocity_) return std::nullopt;
+  const double seconds = time - frame_->time;
+  const bool next = tracked_ && seconds <= 2 * step_seconds_;
+  if (!(seconds > 0) || (seconds > kMaxSeconds && !next)) return std::nullopt;
+  // As long as none was seen: within a step it may stop, or double.
+  const Vector6d acceleration = squared_acceleration_
+                                    ? Vector6d(squared_acceleration_->cwiseSqrt())
+                                    : Vector6d(velocity_->cwiseAbs() / step_seconds_);
+  const Vector6d sigma = acceleration * (0.5 * seconds * (seconds + step_seconds_));
+  return UncertainMotion{se3_exp(Vector6d(*velocity_ * seconds)),
+                         Matrix6d(sigma.cwiseAbs2().asDiagonal())};
 }
 
 }  // namespace hybrid_slam

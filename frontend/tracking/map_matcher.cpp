@@ -54,38 +54,58 @@ FeatureView MapMatcher::view_of(const Frame& frame) const {
   return {camera_, frame.features.left, frame.features.u_right, frame.grid};
 }
 
-int MapMatcher::refine(const MapSnapshot& map, Frame& frame,
-                       std::span<const PoseObservation> others) const {
-  refine_with(options_.pose, map, frame, others);
-  return static_cast<int>(valid_ids(frame.landmarks).size());
+PoseSupport MapMatcher::refine(const MapSnapshot& map, const Search& search, Frame& frame,
+                               std::span<const PoseObservation> others) const {
+  return refine_with(options_.pose, map, search, frame, others);
+}
+
+MapMatcher::Search MapMatcher::search_of(const MapSnapshot& map, const Frame& frame,
+                                         std::span<const LandmarkPrediction> predictions) const {
+  const double area = static_cast<double>(image_width(camera_)) * image_height(camera_);
+  return {static_cast<int>(predictions.size()),
+          static_cast<double>(frame.size()) / area *
+              accidental_match_rate(map, view_of(frame), predictions, options_.matcher)};
 }
 
 void MapMatcher::keep_agreeing(const MapSnapshot& map, Frame& frame) const {
   PoseRefinementOptions test_alone = options_.pose;
   test_alone.rounds = 1;
   test_alone.iterations = 0;
-  refine_with(test_alone, map, frame, {});
+  refine_with(test_alone, map, {}, frame, {});
 }
 
-PoseRefinementResult MapMatcher::refine_with(const PoseRefinementOptions& options,
-                                             const MapSnapshot& map, Frame& frame,
-                                             std::span<const PoseObservation> others) const {
+PoseSupport MapMatcher::refine_with(const PoseRefinementOptions& options, const MapSnapshot& map,
+                                    const Search& search, Frame& frame,
+                                    std::span<const PoseObservation> others) const {
   std::vector<std::size_t> keypoint;
   auto observations = pose_observations(map, frame.features.left, frame.features.u_right,
                                         frame.landmarks, keypoint);
   observations.insert(observations.end(), others.begin(), others.end());
   auto refined = refine_pose(camera_, frame.cam_from_world, observations, options);
+  PoseSupport support;
+  support.candidates = search.landmarks;
   std::vector<LandmarkId> kept(frame.size());
+  std::vector<double> depths;
+  double chances = 0;
   for (std::size_t i = 0; i < keypoint.size(); ++i) {
-    if (refined.inlier[i]) kept[keypoint[i]] = frame.landmarks[keypoint[i]];
+    if (!refined.inlier[i]) continue;
+    chances += chance_in_area(frame.features.left.keypoints[keypoint[i]].sigma, options.chi2_mono,
+                              1 / search.accidents_per_area);
+    kept[keypoint[i]] = frame.landmarks[keypoint[i]];
+    depths.push_back((refined.cam_from_world * observations[i].point_in_world).norm());
   }
+  support.inliers = static_cast<int>(depths.size());
+  if (support.inliers > 0) support.chance = chances / support.inliers;
+  support.covariance = covariance_of_information(refined.information);
+  support.depth = median_of(std::move(depths));
   frame.landmarks = std::move(kept);
   frame.cam_from_world = refined.cam_from_world;
-  return refined;
+  return support;
 }
 
-int MapMatcher::match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids,
-                                  double radius, Frame& frame) const {
+MapMatcher::Search MapMatcher::match_projections(const MapSnapshot& map,
+                                                 std::span<const LandmarkId> ids, double radius,
+                                                 Frame& frame) const {
   ProjectionMatcherOptions matcher = options_.matcher;
   matcher.radius = radius;
   const auto predictions =
@@ -93,12 +113,11 @@ int MapMatcher::match_projections(const MapSnapshot& map, std::span<const Landma
   const auto matches = match_predictions(map, view_of(frame), predictions, nullptr, matcher);
   frame.landmarks.assign(frame.size(), LandmarkId());
   assign(matches, frame);
-  return static_cast<int>(matches.size());
+  return search_of(map, frame, predictions);
 }
 
 std::optional<MapMatcher::LocalMapMatch> MapMatcher::match_local_map(
-    const MapSnapshot& map, const std::vector<LandmarkId>& seeds, int min_inliers,
-    Frame& frame) const {
+    const MapSnapshot& map, const std::vector<LandmarkId>& seeds, Frame& frame) const {
   const LocalMap local = make_local_map(map, seeds, options_.local_map);
   if (!local.reference.valid()) {
     return std::nullopt;
@@ -117,15 +136,13 @@ std::optional<MapMatcher::LocalMapMatch> MapMatcher::match_local_map(
   matcher.radius = options_.local_map_radius;
   assign(match_predictions(map, view_of(frame), without(predictions, frame), &taken, matcher),
          frame);
-  match.information = refine_with(options_.pose, map, frame, {}).information;
+  match.search = search_of(map, frame, predictions);
+  match.support = refine(map, match.search, frame);
   const std::vector<Keypoint> keypoints = frame.features.left.keypoints;
   const std::vector<float> u_right = frame.features.u_right;
-  if (refiner_.refine(map, frame) > 0) {
-    match.information = refine_with(options_.pose, map, frame, {}).information;
-  }
+  if (refiner_.refine(map, frame) > 0) match.support = refine(map, match.search, frame);
   match.counts.found = valid_ids(frame.landmarks);
-  match.inliers = static_cast<int>(match.counts.found.size());
-  if (match.inliers < min_inliers) {
+  if (!is_believed(match.support)) {
     frame.features.left.keypoints = keypoints;
     frame.features.u_right = u_right;
     frame.aligned.clear();
@@ -141,13 +158,23 @@ bool MapMatcher::relocalize(const MapSnapshot& map, std::span<const KeyframeId> 
     return match_keyframe(map, id, frame.features.left, options.ratio,
                           options.max_descriptor_distance);
   };
-  if (relocalize(map, keyframes, match_all, frame)) {
+  if (relocalize_in(map, keyframes, frame)) {
     return true;
   }
   if (places_ != nullptr && places_->knows(frame.features.left.kind)) {
     return find_place(map, keyframes, frame);
   }
   return relocalize(map, newest_keyframes(map, options.max_keyframes), match_all, frame);
+}
+
+bool MapMatcher::relocalize_in(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
+                               Frame& frame) const {
+  const RelocalizationOptions& options = options_.relocalization;
+  const auto match_all = [&](KeyframeId id) {
+    return match_keyframe(map, id, frame.features.left, options.ratio,
+                          options.max_descriptor_distance);
+  };
+  return relocalize(map, keyframes, match_all, frame);
 }
 
 bool MapMatcher::find_place(const MapSnapshot& map, std::span<const KeyframeId> tried,

@@ -10,6 +10,7 @@
 #include "backend/map/map_snapshot.h"
 #include "frontend/matching/projection_matcher.h"
 #include "frontend/place_recognition/keyframe_database.h"
+#include "frontend/pose/pose_belief.h"
 #include "frontend/pose/pose_refinement.h"
 #include "frontend/tracking/frame.h"
 #include "frontend/tracking/keyframe_policy.h"
@@ -21,9 +22,9 @@ namespace hybrid_slam {
 
 // What the trackers of both cameras have in common.
 struct TrackerOptions {
-  int max_features = 2000;      // N: the measure of shares
-  double local_map_radius = 3;  // [px]
-  int min_local_map_inliers = 30;
+  int max_features = 2000;         // N: the measure of shares
+  double local_map_radius = 3;     // [px]
+  int min_local_map_inliers = 30;  // no effect: see is_believed()
   ProjectionMatcherOptions matcher;
   PoseRefinementOptions pose;
   LocalMapOptions local_map;
@@ -51,38 +52,51 @@ class MapMatcher {
 
   FeatureView view_of(const Frame& frame) const;
 
-  // Optimises the pose on the landmarks that the frame has, and on `others`, which the map does not
-  // hold. Drops those that disagree. Returns how many landmarks are left.
-  int refine(const MapSnapshot& map, Frame& frame,
-             std::span<const PoseObservation> others = {}) const;
+  // Landmarks that were looked for, and the mean chance that a keypoint has to match one by
+  // accident: keypoints per area times accidental_match_rate() [1 / px^2].
+  struct Search {
+    int landmarks = 0;
+    double accidents_per_area = 0;
+  };
+
+  // Optimises the pose on the landmarks that the frame has, found in a search, and on `others`,
+  // which the map does not hold. Drops those that disagree. Returns what speaks for the pose: of
+  // the landmarks looked for, so many agree with it, each with the chance that an unlike image has
+  // a keypoint there that matches.
+  PoseSupport refine(const MapSnapshot& map, const Search& search, Frame& frame,
+                     std::span<const PoseObservation> others = {}) const;
 
   // Drops the landmarks that disagree with the frame's pose, which stays as it is.
   void keep_agreeing(const MapSnapshot& map, Frame& frame) const;
 
   // Looks for landmarks in windows of `radius` [px] around their projections, instead of those that
-  // the frame has. Returns how many were found; nothing is optimised.
-  int match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids, double radius,
-                        Frame& frame) const;
+  // the frame has. Nothing is optimised.
+  Search match_projections(const MapSnapshot& map, std::span<const LandmarkId> ids, double radius,
+                           Frame& frame) const;
 
   struct LocalMapMatch {
     KeyframeId reference;  // shares most landmarks with the frame, of either camera
-    int inliers = 0;
-    Matrix6d information;  // of the pose, given the landmarks; as of PoseRefinementResult
+    Search search;
+    PoseSupport support;  // given the landmarks
     SeenLandmarks counts;
   };
 
   // Adds the landmarks of keyframes around `seeds`, at the local map's radius, aligns patches and
-  // optimises. None with fewer than `min_inliers`, or where nothing is around: then the frame's
+  // optimises. None where the pose is not believed, or where nothing is around: then the frame's
   // keypoints are as before, its pose and its landmarks are those that were not believed.
   std::optional<LocalMapMatch> match_local_map(const MapSnapshot& map,
                                                const std::vector<LandmarkId>& seeds,
-                                               int min_inliers, Frame& frame) const;
+                                               Frame& frame) const;
 
   // Finds the frame without a prediction, in the first of `keyframes` that shows it, or else
   // anywhere in the map: in the keyframes that look most like it, or in the newest ones where there
   // are no places, or none for descriptors of this kind.
   bool relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
                   Frame& frame) const;
+
+  // The same in `keyframes` alone.
+  bool relocalize_in(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
+                     Frame& frame) const;
 
   // The frame becomes a keyframe: its image can serve as a reference.
   void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }
@@ -96,8 +110,11 @@ class MapMatcher {
   double shading() const { return refiner_.shading(); }
 
  private:
-  PoseRefinementResult refine_with(const PoseRefinementOptions& options, const MapSnapshot& map,
-                                   Frame& frame, std::span<const PoseObservation> others) const;
+  PoseSupport refine_with(const PoseRefinementOptions& options, const MapSnapshot& map,
+                          const Search& search, Frame& frame,
+                          std::span<const PoseObservation> others) const;
+  Search search_of(const MapSnapshot& map, const Frame& frame,
+                   std::span<const LandmarkPrediction> predictions) const;
   bool relocalize(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
                   const KeyframeMatcher& match, Frame& frame) const;
   bool find_place(const MapSnapshot& map, std::span<const KeyframeId> tried, Frame& frame) const;

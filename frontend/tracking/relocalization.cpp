@@ -18,11 +18,16 @@ int refine_and_prune(const MapSnapshot& map, const FeatureView& view,
   const auto refined = refine_pose(view.camera, frame.cam_from_world, observations, options);
   frame.cam_from_world = refined.cam_from_world;
   frame.inliers = refined.inliers;
+  frame.covariance = covariance_of_information(refined.information);
+  std::vector<double> depths;
   for (std::size_t i = 0; i < keypoint.size(); ++i) {
     if (!refined.inlier[i]) {
       frame.landmarks[keypoint[i]] = LandmarkId();
+    } else {
+      depths.push_back((frame.cam_from_world * observations[i].point_in_world).norm());
     }
   }
+  frame.depth = median_of(std::move(depths));
   return frame.inliers;
 }
 
@@ -62,6 +67,19 @@ void search_around(const MapSnapshot& map, const FeatureView& view,
   }
 }
 
+// The matches were looked for all over the image.
+PoseSupport support_of(const PnpResult& pnp, const std::vector<PoseObservation>& observations,
+                       const Camera& camera, const PoseRefinementOptions& options) {
+  const double area = static_cast<double>(image_width(camera)) * image_height(camera);
+  double chances = 0;
+  for (const PoseObservation& o : observations) {
+    chances += chance_in_area(o.sigma, options.chi2_mono, area);
+  }
+  return {.candidates = static_cast<int>(observations.size()),
+          .inliers = pnp.inliers,
+          .chance = chances / static_cast<double>(observations.size())};
+}
+
 std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const FeatureView& view,
                                              KeyframeId id, const std::vector<LandmarkId>& matched,
                                              const ProjectionMatcherOptions& matcher,
@@ -69,15 +87,14 @@ std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const Featu
                                              const RelocalizationOptions& options) {
   std::vector<std::size_t> keypoint;
   const auto observations = pose_observations(map, view.features, view.u_right, matched, keypoint);
-  if (observations.size() < static_cast<std::size_t>(options.min_matches)) {
-    return std::nullopt;
-  }
   const auto pnp =
       solve_pnp_ransac(bearing_observations(view.camera, observations), options.ransac);
-  if (!pnp) {
+  if (!pnp || !is_no_accident(support_of(*pnp, observations, view.camera, pose))) {
     return std::nullopt;
   }
-  RelocalizedFrame frame{pnp->cam_from_world, id, std::vector<LandmarkId>(view.features.size()), 0};
+  RelocalizedFrame frame{.cam_from_world = pnp->cam_from_world,
+                         .keyframe = id,
+                         .landmarks = std::vector<LandmarkId>(view.features.size())};
   for (std::size_t i = 0; i < keypoint.size(); ++i) {
     if (pnp->inlier[i]) {
       frame.landmarks[keypoint[i]] = matched[keypoint[i]];
@@ -90,7 +107,7 @@ std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const Featu
     search_around(map, view, matcher, radius, frame);
     refine_and_prune(map, view, pose, frame);
   }
-  if (frame.inliers < options.min_inliers) {
+  if (!is_certain(frame.covariance, frame.depth)) {
     return std::nullopt;
   }
   return frame;

@@ -9,6 +9,7 @@
 #include "frontend/matching/projection_matcher.h"
 #include "frontend/place_recognition/image_words.h"
 #include "frontend/pose/pnp_ransac.h"
+#include "frontend/pose/pose_belief.h"
 #include "frontend/pose/pose_refinement.h"
 
 namespace hybrid_slam {
@@ -17,11 +18,11 @@ struct RelocalizationOptions {
   int max_keyframes = 20;  // the most similar ones, where nothing else is known
   double ratio = 0.75;     // best against second best descriptor
   double max_descriptor_distance = 0.7;
-  int min_matches = 15;
-  int min_inliers = 50;      // after guided search
+  int min_matches = 15;  // no effect, as min_inliers: see is_believed()
+  int min_inliers = 50;
   double wide_radius = 10;   // [px]
   double narrow_radius = 3;  // [px]
-  PnpRansacOptions ransac;
+  PnpRansacOptions ransac{.min_inliers = 6};
 
   // Empty if the values can be used, else what is wrong.
   std::string validate() const;
@@ -32,6 +33,8 @@ struct RelocalizedFrame {
   KeyframeId keyframe;                // the one it was found in
   std::vector<LandmarkId> landmarks;  // one per keypoint, inliers only
   int inliers = 0;
+  Matrix6d covariance = PoseSupport().covariance;  // given the landmarks
+  double depth = 0;                                // median distance of these [m]
 };
 
 // Descriptor matches between the landmarks of a keyframe and an image's features: one entry per
@@ -61,8 +64,9 @@ std::vector<PoseObservation> pose_observations(const MapSnapshot& map, const Fea
 std::vector<KeyframeId> newest_keyframes(const MapSnapshot& map, int count);
 
 // Finds an image in the map without any prediction: `match` with one of `keyframes` after the
-// other, PnP in RANSAC, guided search. None if no keyframe yields min_inliers; ids that are not
-// in the map are passed over.
+// other, PnP in RANSAC, guided search. None if no keyframe yields a pose to believe: agreement over
+// the whole image that is no accident, and certain after guided search
+// (frontend/pose/pose_belief.h). Ids that are not in the map are passed over.
 std::optional<RelocalizedFrame> relocalize(const MapSnapshot& map, const FeatureView& view,
                                            std::span<const KeyframeId> keyframes,
                                            const KeyframeMatcher& match,

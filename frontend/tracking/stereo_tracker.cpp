@@ -6,7 +6,6 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 
 #include "cameras/geometry/se3.h"
 #include "frontend/tracking/stereo_keyframe.h"
@@ -21,18 +20,33 @@ constexpr double kMaxDisagreement = 38.3;
 // Share of what the odometer finds again of the last frame, below which the map shows little.
 constexpr double kFewLandmarks = 0.25;
 
-int count_valid(const std::vector<LandmarkId>& ids) {
-  return static_cast<int>(
-      std::count_if(ids.begin(), ids.end(), [](LandmarkId id) { return id.valid(); }));
-}
+// A pose that was coasted is of use as long as the camera sees most of what it says it sees: three
+// sigma of its place are a third of the scene's distance.
+constexpr double kMaxCoastedSigma = 0.11;
+
+constexpr int kNearbyKeyframes = 5;  // of each kind, to find the frame in by descriptors
 
 // Whether the motion from the last frame leads to where the map has the present one. The map's
-// information is that of one pose; both have about the same.
+// covariance is that of one pose; both have about the same.
 bool agrees(const StereoMotion& motion, const Rigid3d& predicted, const Rigid3d& by_map,
-            const Matrix6d& information) {
+            const Matrix6d& map_covariance) {
   const Vector6d off = se3_log(by_map * inverse(predicted));
-  const Matrix6d covariance = motion.covariance + 2 * information.inverse();
+  const Matrix6d covariance = motion.covariance + 2 * map_covariance;
   return off.dot(covariance.ldlt().solve(off)) <= kMaxDisagreement;
+}
+
+// The reference of the last tracked frame, those that share landmarks with it, and the newest.
+std::vector<KeyframeId> nearby_keyframes(const MapSnapshot& map, KeyframeId reference) {
+  std::vector<KeyframeId> ids;
+  const auto add = [&](KeyframeId id) {
+    if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+  };
+  if (map.find(reference) != nullptr) {
+    add(reference);
+    for (const Covisible& one : map.covisible(reference, 1, kNearbyKeyframes)) add(one.id);
+  }
+  for (const KeyframeId id : newest_keyframes(map, kNearbyKeyframes)) add(id);
+  return ids;
 }
 
 void clear(Frame& frame) { frame.landmarks.assign(frame.size(), LandmarkId()); }
@@ -64,7 +78,7 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
     : camera_id_(camera_id),
       camera_(camera),
       options_(options),
-      odometer_(camera, options.odometer),
+      ladder_(camera, options.odometer),
       disparity_(camera, options.disparity),
       matcher_(camera_id, camera, options, std::move(places)),
       last_(camera_id) {
@@ -88,46 +102,11 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
   result.time = frame.time;
   result.disparity_offset = frame.u_right_correction;
   result.shading = matcher_.shading();
-  if (last_.tracked()) {
-    const auto motion = predict(frame, result);
-    const Rigid3d predicted = frame.cam_from_world;
-    if (!track_last_frame(frame, map, result)) {
-      frame.cam_from_world = predicted;
-      if (!track_reference(frame, map)) {
-        frame.cam_from_world = predicted;
-        clear(frame);
-      }
-    }
-    const auto information = track_local_map(frame, map, options_.min_local_map_inliers, result);
-    const bool believed =
-        motion && (!information || agrees(*motion, predicted, frame.cam_from_world, *information));
-    chain_.add(believed ? motion : std::nullopt);
-    if (information) {
-      result.source = PoseSource::kLocalMap;
-      std::vector<PoseObservation> others;
-      if (motion && result.inliers < kFewLandmarks * result.odometer_inliers) {
-        others = points_of_last_frame(*motion, frame);
-        result.inliers = matcher_.refine(map, frame, others);
-        result.counts.found = valid_ids(frame.landmarks);
-      }
-      uncertain_ =
-          hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
-                                      options_.pose, others, uncertain_ ? &*uncertain_ : nullptr);
-    } else if (result.odometer_inliers >= options_.min_odometer_inliers) {
-      frame.cam_from_world = predicted;
-      matcher_.keep_agreeing(map, frame);
-      result.reference = last_.reference();
-      result.source = PoseSource::kOdometer;
-      uncertain_ =
-          moved(*uncertain_, {motion->current_from_previous, motion->covariance}, frame.index);
-    }
-  } else if (matcher_.relocalize(map, {}, frame) &&
-             track_local_map(frame, map, options_.relocalization.min_inliers, result)) {
-    result.source = PoseSource::kRelocalization;
-    uncertain_ = hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
-                                             options_.pose);
-  } else if (options_.new_components && allow_keyframe && !last_.waits_for_keyframe()) {
-    result.counts = {};
+  if (last_.known()) track_onwards(frame, map, result);
+  if (!result.tracked()) relocalize(frame, map, result);
+  if (!result.tracked() && last_.known()) coast(frame, map, result);
+  const bool lost = !result.tracked() && !result.coasted();
+  if (lost && options_.new_components && allow_keyframe && !last_.waits_for_keyframe()) {
     begin_component(frame, map, result);
   }
   if (result.tracked()) {
@@ -141,6 +120,111 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
     }
   }
   return remember(map, std::move(frame), std::move(result));
+}
+
+// From the last tracked frame on: by the map where that holds, else by the motion since.
+void StereoTracker::track_onwards(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
+  const auto step = predict(frame, result);
+  if (result.prediction == Prediction::kNone) return;
+  const Rigid3d predicted = frame.cam_from_world;
+  if (!track_last_frame(frame, map, result)) {
+    frame.cam_from_world = predicted;
+    if (!track_keyframes(frame, map)) {
+      frame.cam_from_world = predicted;
+      clear(frame);
+    }
+  }
+  auto match = track_local_map(frame, map);
+  if (match && step && is_contradicted(*step, predicted, frame, *match)) match.reset();
+  const bool agreed =
+      step && step->believed &&
+      (!match || agrees(step->motion, predicted, frame.cam_from_world, match->support.covariance));
+  if (match || agreed) chain_.add(agreed ? std::optional(step->motion) : std::nullopt);
+  if (match) {
+    result.source = PoseSource::kLocalMap;
+    result.reference = match->reference;
+    result.inliers = match->support.inliers;
+    result.counts = std::move(match->counts);
+    depth_ = match->support.depth;
+    std::vector<PoseObservation> others;
+    if (agreed && result.prediction != Prediction::kAcrossGap &&
+        result.inliers < kFewLandmarks * result.odometer_inliers) {
+      others = points_of_last_frame(step->motion, frame);
+      result.inliers = matcher_.refine(map, match->search, frame, others).inliers;
+      result.counts.found = valid_ids(frame.landmarks);
+    }
+    uncertain_ =
+        hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
+                                    options_.pose, others, uncertain_ ? &*uncertain_ : nullptr);
+  } else if (agreed) {
+    frame.cam_from_world = predicted;
+    matcher_.keep_agreeing(map, frame);
+    result.reference = last_.reference();
+    result.source = PoseSource::kOdometer;
+    depth_ = step->motion.support.depth;
+    uncertain_ = moved(*uncertain_, {step->motion.current_from_previous, step->motion.covariance},
+                       frame.index);
+  }
+}
+
+// Where the map and a motion that is believed say different things, one of them is wrong. The map
+// is, where few of the landmarks hold that the frame should show with the points that moved.
+bool StereoTracker::is_contradicted(const LadderStep& step, const Rigid3d& predicted,
+                                    const Frame& frame,
+                                    const MapMatcher::LocalMapMatch& match) const {
+  return step.believed && match.support.inliers < kFewLandmarks * step.motion.support.inliers &&
+         !agrees(step.motion, predicted, frame.cam_from_world, match.support.covariance);
+}
+
+void StereoTracker::relocalize(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
+  clear(frame);
+  std::vector<KeyframeId> nearby;  // where they were not tried before
+  if (last_.known() && result.prediction == Prediction::kNone) {
+    nearby = nearby_keyframes(map, last_.reference());
+  }
+  if (!matcher_.relocalize(map, nearby, frame)) return;
+  auto match = track_local_map(frame, map);
+  if (!match) return;
+  result.source = PoseSource::kRelocalization;
+  result.prediction = Prediction::kNone;
+  result.reference = match->reference;
+  result.inliers = match->support.inliers;
+  result.counts = std::move(match->counts);
+  depth_ = match->support.depth;
+  chain_.add(std::nullopt);
+  uncertain_ =
+      hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference, options_.pose);
+}
+
+// Goes on by itself: by the motion since a frame after the last good one, or at constant velocity.
+void StereoTracker::coast(const Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
+  const auto step = across_gap(frame);
+  std::optional<UncertainMotion> from_last = last_.constant_velocity(frame.time);
+  if (step) from_last = {step->motion.current_from_previous, step->motion.covariance};
+  if (!from_last) return;  // unplaced_ stays: the next frame may go on from there
+  unplaced_ = {frame, *from_last};
+  if (!(translation_sigma(from_last->covariance) <= kMaxCoastedSigma * depth_)) return;
+  result.source = PoseSource::kCoasted;
+  result.prediction = step ? Prediction::kAcrossGap : Prediction::kConstantVelocity;
+  result.reference = last_.reference();
+  result.cam_from_world = from_last->b_from_a * last_.frame().cam_from_world;
+  result.cam_from_reference = result.cam_from_world * inverse(map.cam_from_world(result.reference));
+  write_covariance(map, moved(*uncertain_, *from_last, frame.index), result);
+}
+
+// From the last tracked frame, by a frame between whose place was not known well enough.
+std::optional<LadderStep> StereoTracker::across_gap(const Frame& frame) const {
+  if (!unplaced_) return std::nullopt;
+  auto step = ladder_.climb(unplaced_->frame, frame);
+  if (!step || !step->believed) return std::nullopt;
+  const UncertainMotion whole =
+      UncertainMotion{step->motion.current_from_previous, step->motion.covariance} *
+      unplaced_->from_last;
+  step->motion.current_from_previous = whole.b_from_a;
+  step->motion.covariance = whole.covariance;
+  step->believed = is_certain(whole.covariance, step->motion.support.depth);
+  step->rung = Prediction::kAcrossGap;
+  return step;
 }
 
 TrackedFrame StereoTracker::initialize(Frame& frame, const MapSnapshot& map) const {
@@ -164,12 +248,15 @@ bool StereoTracker::can_carry_map(const Frame& frame) const {
 
 // Where the vehicle is against the map is not known: the frame gets the pose of the newest stereo
 // keyframe, as good as any, and is held there by nothing.
-bool StereoTracker::begin_component(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
+void StereoTracker::begin_component(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
   const Keyframe* const newest = map.newest_keyframe(camera_id_);
-  if (newest == nullptr || !can_carry_map(frame)) return false;
+  const auto coverage = stereo_coverage(camera_, frame, close_depth());
+  if (newest == nullptr || !coverage || !can_carry_map(frame)) return;
   clear(frame);
   frame.cam_from_world = newest->cam_from_world;
+  result.counts = {};
   result.source = PoseSource::kInitialization;
+  result.prediction = Prediction::kNone;
   result.reference = newest->id;
   result.keyframe = make_stereo_keyframe(camera_id_, camera_, frame, newest->id, close_depth(),
                                          options_.min_new_points);
@@ -178,8 +265,8 @@ bool StereoTracker::begin_component(Frame& frame, const MapSnapshot& map, Tracke
   odometry.motion = unknown_motion(Rigid3d());
   uncertain_ = moved(UncertainPose::of_keyframe(camera_id_, frame.index, newest->id),
                      odometry.motion, frame.index);
+  depth_ = coverage->median_depth;
   result.keyframe->odometry = std::make_shared<const Odometry>(std::move(odometry));
-  return true;
 }
 
 void StereoTracker::correct_disparities(Frame& frame) const {
@@ -189,24 +276,28 @@ void StereoTracker::correct_disparities(Frame& frame) const {
   }
 }
 
-// Odometer and predicted pose; constant velocity, then the last pose, where the odometer fails.
-std::optional<StereoMotion> StereoTracker::predict(Frame& frame, TrackedFrame& result) {
+// The motion since the last tracked frame and the pose by it; constant velocity, then the last
+// pose, where there is none.
+std::optional<LadderStep> StereoTracker::predict(Frame& frame, TrackedFrame& result) {
   const Frame& last = last_.frame();
-  auto motion = odometer_.estimate(last.features, frame.features);
-  if (motion) {
-    result.prediction = Prediction::kOdometer;
-    result.odometer_inliers = static_cast<int>(motion->inliers.size());
-    frame.cam_from_world = motion->current_from_previous * last.cam_from_world;
+  auto step = ladder_.climb(last, frame);
+  if (step && step->rung == Prediction::kOdometer) {
     disparity_.add(last.features, last.u_right_correction, frame.features, frame.u_right_correction,
-                   *motion);
-  } else if (last_.velocity()) {
+                   step->motion);
+  }
+  if (!step) step = across_gap(frame);
+  if (step) {
+    result.prediction = step->rung;
+    result.odometer_inliers = step->motion.support.inliers;
+    frame.cam_from_world = step->motion.current_from_previous * last.cam_from_world;
+  } else if (const auto motion = last_.constant_velocity(frame.time)) {
     result.prediction = Prediction::kConstantVelocity;
-    frame.cam_from_world = *last_.velocity() * last.cam_from_world;
-  } else {
+    frame.cam_from_world = motion->b_from_a * last.cam_from_world;
+  } else if (last_.tracked()) {
     result.prediction = Prediction::kLastPose;
     frame.cam_from_world = last.cam_from_world;
   }
-  return motion;
+  return step;
 }
 
 // Where the map shows little, as it does where mapping lags behind or at its border, few landmarks
@@ -235,50 +326,34 @@ std::vector<PoseObservation> StereoTracker::points_of_last_frame(const StereoMot
 bool StereoTracker::track_last_frame(Frame& frame, const MapSnapshot& map,
                                      TrackedFrame& result) const {
   const std::vector<LandmarkId> ids = valid_ids(last_.frame().landmarks);
-  const double radius = options_.last_frame_radius;
-  int matched = matcher_.match_projections(map, ids, radius, frame);
-  if (matched < share_of_features(frame, options_.last_frame_retry_share)) {
-    matched = matcher_.match_projections(map, ids, 2 * radius, frame);
+  const Rigid3d predicted = frame.cam_from_world;
+  for (const double radius : {options_.last_frame_radius, 2 * options_.last_frame_radius}) {
+    frame.cam_from_world = predicted;
+    const auto search = matcher_.match_projections(map, ids, radius, frame);
+    const PoseSupport support = matcher_.refine(map, search, frame);
+    result.last_frame_inliers = support.inliers;
+    if (is_no_accident(support)) return true;
   }
-  if (matched < share_of_features(frame, options_.last_frame_min_share)) {
-    clear(frame);
-    return false;
-  }
-  result.last_frame_inliers = matcher_.refine(map, frame);
-  return result.last_frame_inliers >= options_.min_pose_inliers;
+  clear(frame);
+  return false;
 }
 
-bool StereoTracker::track_reference(Frame& frame, const MapSnapshot& map) const {
-  if (map.find(last_.reference()) == nullptr) {
-    return false;
-  }
-  frame.landmarks =
-      match_keyframe(map, last_.reference(), frame.features.left, options_.relocalization.ratio,
-                     options_.relocalization.max_descriptor_distance);
-  return count_valid(frame.landmarks) >= options_.min_reference_matches &&
-         matcher_.refine(map, frame) >= options_.min_pose_inliers;
+bool StereoTracker::track_keyframes(Frame& frame, const MapSnapshot& map) const {
+  return matcher_.relocalize_in(map, nearby_keyframes(map, last_.reference()), frame);
 }
 
-// The information of the pose that was found; none if that is not believed.
-std::optional<Matrix6d> StereoTracker::track_local_map(Frame& frame, const MapSnapshot& map,
-                                                       int min_inliers,
-                                                       TrackedFrame& result) const {
+// None if the pose is not believed.
+std::optional<MapMatcher::LocalMapMatch> StereoTracker::track_local_map(
+    Frame& frame, const MapSnapshot& map) const {
   std::vector<LandmarkId> seeds = valid_ids(frame.landmarks);
-  if (seeds.empty()) {
+  if (seeds.empty() && last_.known()) {
     seeds = valid_ids(last_.frame().landmarks);
   }
   const Keyframe* reference = map.find(last_.reference());
   if (seeds.empty() && reference != nullptr) {
     seeds = valid_ids(reference->landmarks);
   }
-  auto match = matcher_.match_local_map(map, seeds, min_inliers, frame);
-  if (!match) {
-    return std::nullopt;
-  }
-  result.reference = match->reference;
-  result.inliers = match->inliers;
-  result.counts = std::move(match->counts);
-  return match->information;
+  return matcher_.match_local_map(map, seeds, frame);
 }
 
 bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
@@ -312,15 +387,11 @@ NewKeyframe StereoTracker::make_keyframe(const Frame& frame, const MapSnapshot& 
   return keyframe;
 }
 
-int StereoTracker::share_of_features(const Frame& frame, double share) const {
-  return static_cast<int>(
-      share * std::min<double>(options_.max_features, static_cast<double>(frame.size())));
-}
-
 TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, TrackedFrame result) {
-  if (!last_.tracked()) chain_.add(std::nullopt);
-  if (!result.tracked()) uncertain_.reset();
-  if (result.tracked()) matcher_.learn_shading(map, frame);
+  if (result.tracked()) {
+    unplaced_.reset();
+    matcher_.learn_shading(map, frame);
+  }
   if (result.keyframe) {
     chain_.begin();
     matcher_.remember_keyframe(frame);

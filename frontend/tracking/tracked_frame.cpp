@@ -12,6 +12,8 @@ const char* to_string(PoseSource source) {
       return "odometer";
     case PoseSource::kRelocalization:
       return "relocalization";
+    case PoseSource::kCoasted:
+      return "coasted";
     case PoseSource::kNone:
       break;
   }
@@ -22,6 +24,12 @@ const char* to_string(Prediction prediction) {
   switch (prediction) {
     case Prediction::kOdometer:
       return "odometer";
+    case Prediction::kLeftMatches:
+      return "left_matches";
+    case Prediction::kPatches:
+      return "patches";
+    case Prediction::kAcrossGap:
+      return "across_gap";
     case Prediction::kConstantVelocity:
       return "constant_velocity";
     case Prediction::kLastPose:

@@ -9,8 +9,20 @@
 
 namespace hybrid_slam {
 
-enum class PoseSource { kNone, kInitialization, kLocalMap, kOdometer, kRelocalization };
-enum class Prediction { kNone, kOdometer, kConstantVelocity, kLastPose };
+// kCoasted: a pose that nothing in the frame says, or that hangs on one; it counts as not tracked.
+enum class PoseSource { kNone, kInitialization, kLocalMap, kOdometer, kRelocalization, kCoasted };
+
+// The rung of the ladder on which the motion since the last tracked frame was found
+// (docs/tracking.md).
+enum class Prediction {
+  kNone,
+  kOdometer,          // matches that close a circle
+  kLeftMatches,       // of the left image alone
+  kPatches,           // followed by optical flow
+  kAcrossGap,         // since a frame that was not tracked, whose own place was coasted
+  kConstantVelocity,  // nothing measured
+  kLastPose
+};
 
 const char* to_string(PoseSource source);
 const char* to_string(Prediction prediction);
@@ -51,7 +63,8 @@ struct TrackedFrame {
   std::optional<NewKeyframe> keyframe;  // set if the frame shall become one
   SeenLandmarks counts;
 
-  bool tracked() const { return source != PoseSource::kNone; }
+  bool tracked() const { return source != PoseSource::kNone && !coasted(); }
+  bool coasted() const { return source == PoseSource::kCoasted; }
 };
 
 }  // namespace hybrid_slam

@@ -31,7 +31,8 @@ std::string engine_by_default() {
 void check_frames(const Json& summary, int read, int tracked, int corrupt = 0) {
   INFO(summary.dump(1));
   const Json& frames = summary["frames"];
-  CHECK(frames.size() == 6);
+  CHECK(frames.size() == 7);
+  CHECK(frames["coasted"] == 0);
   CHECK(frames["other_components"] == 0);
   CHECK(frames["read"] == read);
   CHECK(frames["tracked"] == tracked);
