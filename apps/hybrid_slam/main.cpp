@@ -57,8 +57,8 @@ int run(CommandLine line, const Interrupt& interrupt) {
   if (!line.vocabulary.empty()) {
     options.session.vocabulary = load_vocabulary(line.vocabulary, DescriptorKind::kRootSift);
   }
-  const auto sequence =
-      open_sequence(line.dataset, line.layout, line.sequence, line.cameras, line.truth_convention);
+  const auto sequence = open_sequence(line.dataset, line.layout, line.sequence, line.cameras,
+                                      line.truth_convention, line.input);
   make_output_folder(line.out);
   for (const std::string& warning : sequence->info().warnings) {
     spdlog::warn(warning);
