@@ -78,6 +78,10 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
       {"auto", TruthConvention::kAuto},
       {"world_from_cam", TruthConvention::kWorldFromCam},
       {"cam_from_world", TruthConvention::kCamFromWorld}};
+  const std::map<std::string, GrayChannel> channels{{"grey", GrayChannel::kGrey},
+                                                    {"red", GrayChannel::kRed},
+                                                    {"green", GrayChannel::kGreen},
+                                                    {"blue", GrayChannel::kBlue}};
   const std::map<std::string, SessionMode> modes{{"every-frame", SessionMode::kEveryFrame},
                                                  {"realtime", SessionMode::kRealtime}};
 
@@ -112,6 +116,18 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
                  "how the true poses of a UWslam sequence are meant; auto (default) finds out")
       ->transform(CLI::CheckedTransformer(conventions).description(""))
       ->option_text("auto|world_from_cam|cam_from_world");
+  app.add_option("--channel", line.input.images.channel,
+                 "of colour images: grey (default: all three weighed), red, green or blue")
+      ->transform(CLI::CheckedTransformer(channels).description(""))
+      ->option_text("NAME");
+  app.add_option("--white-level", line.input.images.white,
+                 "sample that is white in images of more than 8 bits (default: found)")
+      ->check(CLI::Range(255, 65535).description(""));
+  app.add_option(
+         "--pair-tolerance", line.input.pair_tolerance,
+         "seconds that the times of left and right may differ (default: a tenth of the frame "
+         "period, at most 0.01)")
+      ->check(CLI::Range(1e-6, 10.0).description(""));
   app.add_option("--features", features, "features per image (default 2000)")
       ->check(CLI::Range(50, 100000).description(""));
   app.add_option("--seed", seed, "of every random choice (default 0)")

@@ -18,6 +18,7 @@ struct CommandLine {
   std::string sequence;
   SequenceCameras cameras = SequenceCameras::kAuto;
   TruthConvention truth_convention = TruthConvention::kAuto;
+  InputOptions input;
   std::string out = "out";
   SessionMode mode = SessionMode::kEveryFrame;
   double rate = 0;                       // [Hz]; 0: images wait for the pipeline

@@ -59,8 +59,8 @@ int run(CommandLine line, const Interrupt& interrupt) {
   if (!line.vocabulary.empty()) {
     options.session.vocabulary = load_vocabulary(line.vocabulary, DescriptorKind::kRootSift);
   }
-  const auto sequence =
-      open_sequence(line.dataset, line.layout, line.sequence, line.cameras, line.truth_convention);
+  const auto sequence = open_sequence(line.dataset, line.layout, line.sequence, line.cameras,
+                                      line.truth_convention, line.input);
   make_output_folder(line.out);
   if (!line.log.empty()) open_log(line.log, line.log_level);
   for (const std::string& warning : sequence->info().warnings) {

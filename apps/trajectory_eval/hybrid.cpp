@@ -1,5 +1,6 @@
 #include "apps/trajectory_eval/hybrid.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
@@ -23,13 +24,25 @@ void print_warnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) fmt::print(stderr, "trajectory_eval: {}\n", warning);
 }
 
+// Times by the dataset's own script, which has no others: three images in a second.
+std::vector<double> nominal_times(const fs::path& truth, std::vector<std::string>& warnings) {
+  const std::vector<NumberRow> rows = read_number_rows(truth, ' ');
+  std::vector<double> times;
+  const double last = rows.empty() ? 0 : std::clamp(rows.back().values.front(), 0.0, 1e7);
+  for (int i = 0; i <= last; ++i) times.push_back(i / 3.0);
+  warnings.push_back(truth.string() + ": no times.txt beside it; index / 3 s is taken");
+  return times;
+}
+
 CameraPoses read_truth(const fs::path& given, TruthConvention convention) {
   const fs::path file = fs::is_directory(given) ? given / "camera_poses.txt" : given;
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const fs::path plural = folder / "times.txt";
   const fs::path singular = folder / "time.txt";
   std::vector<std::string> warnings;
-  const auto times = read_times(fs::exists(plural) ? plural : singular, warnings);
+  const bool has_times = fs::exists(plural) || fs::exists(singular);
+  const auto times = has_times ? read_times(fs::exists(plural) ? plural : singular, warnings)
+                               : nominal_times(file, warnings);
   CameraPoses poses = read_camera_poses(file, times, convention);
   poses.warnings.insert(poses.warnings.begin(), warnings.begin(), warnings.end());
   return poses;
@@ -38,6 +51,7 @@ CameraPoses read_truth(const fs::path& given, TruthConvention convention) {
 Trajectory read_estimate(const fs::path& path) {
   TrajectoryFile file = read_trajectory(path);
   if (!file.has_times) throw InputError(path.string() + ": has no times");
+  print_warnings(file.notes);
   print_warnings(file.warnings);
   return std::move(file.poses);
 }

@@ -61,6 +61,7 @@ void set_times(TrajectoryFile& file, const std::vector<double>& times, const Opt
 
 TrajectoryFile read_poses(const std::string& path, QuaternionOrder order) {
   TrajectoryFile file = read_trajectory(path, order);
+  for (const std::string& note : file.notes) spdlog::warn(note);
   for (const std::string& warning : file.warnings) spdlog::warn(warning);
   return file;
 }

@@ -52,6 +52,14 @@ void YamlSection::fail(const std::string& key, const std::string& reason) const 
   throw InputError(file_ + place + ": " + prefix_ + key + ": " + reason);
 }
 
+std::vector<std::string> YamlSection::keys() const {
+  std::vector<std::string> keys;
+  for (const auto& entry : node_) {
+    if (entry.first.IsScalar()) keys.push_back(entry.first.Scalar());
+  }
+  return keys;
+}
+
 int YamlSection::line(const std::string& key) const { return required(key).Mark().line + 1; }
 
 void YamlSection::refuse_all_but(const std::set<std::string>& known) const {
@@ -79,6 +87,22 @@ std::string YamlSection::text(const std::string& key) const {
 
 std::vector<double> YamlSection::numbers(const std::string& key, std::size_t count) const {
   return to_numbers(key, required(key), count);
+}
+
+std::vector<double> YamlSection::numbers(const std::string& key) const {
+  const YAML::Node node = required(key);
+  return to_numbers(key, node, node.IsSequence() ? node.size() : 1);
+}
+
+std::vector<YamlSection> YamlSection::children(const std::string& key) const {
+  const YAML::Node node = required(key);
+  if (!node.IsSequence()) fail(key, "must be a list");
+  std::vector<YamlSection> result;
+  for (const YAML::Node& item : node) {
+    if (!item.IsMap()) fail(key, "must be a list of keys and values");
+    result.push_back({file_, prefix_ + key + "[" + std::to_string(result.size()) + "].", item});
+  }
+  return result;
 }
 
 std::vector<std::vector<double>> YamlSection::rows(const std::string& key, std::size_t row_count,

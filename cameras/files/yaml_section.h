@@ -20,6 +20,8 @@ class YamlSection {
   [[noreturn]] void fail(const std::string& key, const std::string& reason) const;
 
   bool has(const std::string& key) const { return static_cast<bool>(node_[key]); }
+  bool has_section(const std::string& key) const { return has(key) && node_[key].IsMap(); }
+  std::vector<std::string> keys() const;   // in the file's order
   int line(const std::string& key) const;  // of its value, counted from 1
   void refuse_all_but(const std::set<std::string>& known) const;
 
@@ -29,6 +31,8 @@ class YamlSection {
   double number(const std::string& key) const;
   std::string text(const std::string& key) const;
   std::vector<double> numbers(const std::string& key, std::size_t count) const;
+  std::vector<double> numbers(const std::string& key) const;        // however many
+  std::vector<YamlSection> children(const std::string& key) const;  // of a list of sections
   std::vector<std::vector<double>> rows(const std::string& key, std::size_t row_count,
                                         std::size_t col_count) const;
 

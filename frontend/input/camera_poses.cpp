@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "frontend/input/median.h"
 #include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"
 
@@ -16,6 +17,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kClearEvidence = 2;  // ratio of implausibilities that decides
+constexpr std::size_t kBothColumns = 15;
+constexpr std::size_t kFisheyeColumns = 8;
 
 // The poses of both cameras as camera_poses.txt has them, whatever they mean.
 struct FilePoses {
@@ -23,13 +26,17 @@ struct FilePoses {
   Rigid3d fish, stereo;
 };
 
-std::vector<FilePoses> read_pose_pairs(const fs::path& path, std::size_t frame_count) {
+// Without the stereo pair's, `has_stereo` is false.
+std::vector<FilePoses> read_pose_pairs(const fs::path& path, std::size_t frame_count,
+                                       bool& has_stereo) {
   std::vector<FilePoses> poses;
   for (const NumberRow& row : read_number_rows(path, ' ')) {
     const std::vector<double>& v = row.values;
-    if (v.size() != 15) {
+    const bool as_first = poses.empty() || has_stereo == (v.size() == kBothColumns);
+    if (!as_first || (v.size() != kBothColumns && v.size() != kFisheyeColumns)) {
       throw line_error(path, row.line, "expected 15 numbers, found " + std::to_string(v.size()));
     }
+    has_stereo = v.size() == kBothColumns;
     if (!(v[0] >= 0 && v[0] < static_cast<double>(frame_count) && v[0] == std::floor(v[0]))) {
       throw line_error(path, row.line, "no time belongs to this index");
     }
@@ -40,18 +47,13 @@ std::vector<FilePoses> read_pose_pairs(const fs::path& path, std::size_t frame_c
     }
     pair.fish = Rigid3d(checked_rotation(v[4], v[5], v[6], v[7], path, row.line),
                         Eigen::Vector3d(v[1], v[2], v[3]));
-    pair.stereo = Rigid3d(checked_rotation(v[11], v[12], v[13], v[14], path, row.line),
-                          Eigen::Vector3d(v[8], v[9], v[10]));
+    if (has_stereo) {
+      pair.stereo = Rigid3d(checked_rotation(v[11], v[12], v[13], v[14], path, row.line),
+                            Eigen::Vector3d(v[8], v[9], v[10]));
+    }
     poses.push_back(pair);
   }
   return poses;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // How little the poses look like those of two cameras on one vehicle: the distance between the two
@@ -101,16 +103,21 @@ bool is_cam_from_world(const std::vector<FilePoses>& poses, const fs::path& path
 
 CameraPoses read_camera_poses(const fs::path& path, const std::vector<double>& times,
                               TruthConvention convention) {
-  const std::vector<FilePoses> poses = read_pose_pairs(path, times.size());
+  bool has_stereo = true;
+  const std::vector<FilePoses> poses = read_pose_pairs(path, times.size(), has_stereo);
   CameraPoses result;
   bool invert = convention == TruthConvention::kCamFromWorld;
-  if (convention == TruthConvention::kAuto) {
+  if (!has_stereo) {
+    result.warnings.push_back(path.string() +
+                              ": has 8 columns: poses of the fisheye alone, read as " +
+                              (invert ? "cam_from_world" : "world_from_cam"));
+  } else if (convention == TruthConvention::kAuto) {
     invert = is_cam_from_world(poses, path, result.warnings);
   }
   result.convention = invert ? "cam_from_world" : "world_from_cam";
   for (const FilePoses& pair : poses) {
     const double time = times[static_cast<std::size_t>(pair.index)];
-    result.stereo.push_back({time, invert ? inverse(pair.stereo) : pair.stereo});
+    if (has_stereo) result.stereo.push_back({time, invert ? inverse(pair.stereo) : pair.stereo});
     result.fisheye.push_back({time, invert ? inverse(pair.fish) : pair.fish});
   }
   return result;

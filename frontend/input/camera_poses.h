@@ -17,7 +17,9 @@ struct CameraPoses {
 };
 
 // UWslam's camera_poses.txt: 15 columns, index, position and quaternion (w x y z) of the fisheye
-// and of the left camera; `times` [s] by index. Throws InputError naming file and line.
+// and of the left camera; or 8 columns, without the latter (UWHandles), which are world_from_cam
+// unless the convention says otherwise; `times` [s] by index. Throws InputError naming file and
+// line.
 CameraPoses read_camera_poses(const std::filesystem::path& path, const std::vector<double>& times,
                               TruthConvention convention);
 

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <numeric>
 
+#include "frontend/input/median.h"
 #include "frontend/input/text_file.h"
 
 namespace hybrid_slam {
@@ -12,24 +15,124 @@ namespace fs = std::filesystem;
 
 namespace {
 
-GrayImage read_or_throw(const fs::path& path, ImageSize size, const std::string& frame,
-                        const char* side) {
+GrayImage read_or_throw(const fs::path& path, ImageSize size, const ImageReading& reading,
+                        const std::string& frame, const char* side) {
   if (path.empty()) throw InputError(frame + ": no " + side + " image");
-  return read_gray_image(path, size);
+  return read_gray_image(path, size, reading);
 }
 
-bool is_image_extension(std::string extension) {
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+// Up to `count` frames, evenly from all over the sequence.
+std::vector<std::size_t> sample_frames(std::size_t size, std::size_t count) {
+  std::vector<std::size_t> frames;
+  for (std::size_t i = 0; i < std::min(size, count); ++i) {
+    frames.push_back(i * size / std::min(size, count));
+  }
+  return frames;
+}
+
+// The highest sample of the images that can be read; 0 where they have 8 bits.
+int highest_sample(const std::vector<FramePaths>& files) {
+  constexpr std::size_t kFrames = 8;
+  int highest = 0;
+  for (const std::size_t frame : sample_frames(files.size(), kFrames)) {
+    const FramePaths& paths = files[frame];
+    for (const fs::path* const path : {&paths.left, &paths.right, &paths.fisheye}) {
+      try {
+        if (!path->empty()) highest = std::max(highest, highest_wide_sample(*path));
+      } catch (const InputError&) {  // counted when the frame is read
+      }
+    }
+    if (highest == 0 && !paths.left.empty()) return 0;
+  }
+  return highest;
+}
+
+// Mean brightness of a few left images that can be read; none if there are none.
+std::optional<double> mean_brightness(const std::vector<FramePaths>& files,
+                                      const ImageReading& reading) {
+  constexpr std::size_t kFrames = 3;
+  double sum = 0;
+  double count = 0;
+  for (const std::size_t frame : sample_frames(files.size(), kFrames)) {
+    try {
+      if (files[frame].left.empty()) continue;
+      const GrayImage image = read_gray_image(files[frame].left, reading);
+      sum = std::accumulate(image.pixels.begin(), image.pixels.end(), sum);
+      count += static_cast<double>(image.pixels.size());
+    } catch (const InputError&) {  // counted when the frame is read
+    }
+  }
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
 }
 
 }  // namespace
 
 FileSequence::FileSequence(SequenceInfo info, std::vector<FramePaths> files,
+                           const InputOptions& options,
                            std::unique_ptr<const StereoRectifier> rectifier)
-    : info_(std::move(info)), files_(std::move(files)), rectifier_(std::move(rectifier)) {
+    : info_(std::move(info)),
+      files_(std::move(files)),
+      options_(options),
+      rectifier_(std::move(rectifier)) {
   if (files_.size() != info_.times.size()) throw std::logic_error("one time per frame");
+  if (options_.images.white == 0) find_white();
+  warn_of_darkness();
+  warn_of_units();
+}
+
+// 16 bits are what they say; fewer are found by what the images hold.
+void FileSequence::find_white() {
+  constexpr int kAllBits = 65535;
+  const int highest = highest_sample(files_);
+  if (highest == 0) return;
+  options_.images.white = white_above(highest);
+  if (options_.images.white == kAllBits) return;
+  info_.warnings.push_back(info_.name + ": the images have more than 8 bits, with samples up to " +
+                           std::to_string(highest) + "; " + std::to_string(options_.images.white) +
+                           " is taken for white (--white-level settles it)");
+}
+
+// A stereo rig is some centimetres to a few metres wide, and its images come every few seconds at
+// most: what is far beyond was written in other units.
+void FileSequence::warn_of_units() {
+  constexpr double kWidest = 5;         // [m]
+  constexpr double kNarrowest = 0.002;  // [m]
+  constexpr double kSlowest = 1000;     // [s] between frames
+  constexpr double kFastest = 1e-5;     // [s]
+  const auto warn = [&](const char* what, double value, const char* question) {
+    char text[160];
+    std::snprintf(text, sizeof(text), "%s %.6g %s", what, value, question);
+    info_.warnings.push_back(info_.name + ": " + text);
+  };
+  const double baseline = info_.stereo.params[4];
+  if (baseline > kWidest) {
+    warn("the baseline is", baseline, "m: is the calibration in millimetres?");
+  } else if (baseline < kNarrowest) {
+    warn("the baseline is", baseline, "m: is the calibration in another unit?");
+  }
+  if (info_.times.size() < 2) return;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < info_.times.size(); ++i) {
+    steps.push_back(info_.times[i] - info_.times[i - 1]);
+  }
+  const double step = median(std::move(steps));
+  if (step > kSlowest) {
+    warn("frames are", step, "s apart: are the times in milli- or nanoseconds?");
+  } else if (step < kFastest) {
+    warn("frames are", step, "s apart: are the times in seconds?");
+  }
+}
+
+void FileSequence::warn_of_darkness() {
+  constexpr double kDark = 8;  // of 255: noise and rounding are a good part of so small a contrast
+  const auto mean = mean_brightness(files_, options_.images);
+  if (!mean || *mean >= kDark) return;
+  char text[16];
+  std::snprintf(text, sizeof(text), "%.1f", *mean);
+  info_.warnings.push_back(
+      info_.name + ": the left images are " +
+      (*mean == 0 ? "black"
+                  : "dark: mean brightness " + std::string(text) + " of 255 in those looked at"));
 }
 
 FrameImages FileSequence::read(std::size_t frame) const {
@@ -39,8 +142,9 @@ FrameImages FileSequence::read(std::size_t frame) const {
   FrameImages images;
   images.frame_index = static_cast<std::int64_t>(frame);
   images.time = info_.times[frame];
-  images.left = read_or_throw(paths.left, size, name, "left");
-  images.right = read_or_throw(paths.right, size, name, "right");
+  images.left = read_or_throw(paths.left, size, options_.images, name, "left");
+  images.right = read_or_throw(paths.right, rectifier_ ? rectifier_->right_size() : size,
+                               options_.images, name, "right");
   if (rectifier_) {
     rectifier_->rectify_left(images.left);
     rectifier_->rectify_right(images.right);
@@ -48,7 +152,7 @@ FrameImages FileSequence::read(std::size_t frame) const {
   if (info_.fisheye) {
     try {
       images.fisheye = read_or_throw(paths.fisheye, {info_.fisheye->width, info_.fisheye->height},
-                                     name, "fisheye");
+                                     options_.images, name, "fisheye");
     } catch (const InputError& error) {
       images.fisheye_error = error.what();
     }
@@ -62,7 +166,7 @@ NumberedImages list_numbered_images(const fs::path& folder, const std::string& s
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const fs::path& path = entry.path();
     const std::string stem = path.stem().string();
-    if (!is_image_extension(path.extension().string()) || !stem.ends_with(suffix)) continue;
+    if (!has_image_extension(path) || !stem.ends_with(suffix)) continue;
     int number = 0;
     const char* const end = stem.data() + stem.size() - suffix.size();
     const auto [parsed, error] = std::from_chars(stem.data(), end, number);

@@ -22,21 +22,27 @@ struct FramePaths {
   std::filesystem::path fisheye;
 };
 
-// A sequence whose images are files. Rectifies what it reads if given a rectifier.
+// A sequence whose images are files. Rectifies what it reads if given a rectifier. What is white in
+// images of more than 8 bits is found over the sequence unless `options` says it.
 class FileSequence : public ImageSequence {
  public:
-  FileSequence(SequenceInfo info, std::vector<FramePaths> files,
+  FileSequence(SequenceInfo info, std::vector<FramePaths> files, const InputOptions& options,
                std::unique_ptr<const StereoRectifier> rectifier);
   const SequenceInfo& info() const override { return info_; }
   FrameImages read(std::size_t frame) const override;
 
  private:
+  void find_white();
+  void warn_of_darkness();
+  void warn_of_units();
+
   SequenceInfo info_;
   std::vector<FramePaths> files_;
+  InputOptions options_;
   std::unique_ptr<const StereoRectifier> rectifier_;  // null: the images are rectified
 };
 
-// Images of a folder by their number: files named <digits><suffix>.<png|jpg|jpeg>. Throws
+// Images of a folder by their number: files named <digits><suffix>.<png|jpg|...>. Throws
 // InputError if the folder is missing or a number occurs twice.
 using NumberedImages = std::map<int, std::filesystem::path>;
 NumberedImages list_numbered_images(const std::filesystem::path& folder, const std::string& suffix);
@@ -90,11 +96,14 @@ std::string folder_name(const std::filesystem::path& path);
 // One file per layout. Null if there is no dataset of this layout at `path`; what can be recognised
 // but not used throws InputError.
 std::unique_ptr<ImageSequence> open_kitti(const std::filesystem::path& path,
-                                          const std::string& name);
+                                          const std::string& name, const InputOptions& options);
+std::unique_ptr<ImageSequence> open_kitti_raw(const std::filesystem::path& path,
+                                              const std::string& name,
+                                              const InputOptions& options);
 std::unique_ptr<ImageSequence> open_euroc(const std::filesystem::path& path,
-                                          const std::string& name);
+                                          const std::string& name, const InputOptions& options);
 std::unique_ptr<ImageSequence> open_uwslam(const std::filesystem::path& path,
                                            const std::string& name, SequenceCameras cameras,
-                                           TruthConvention convention);
+                                           TruthConvention convention, const InputOptions& options);
 
 }  // namespace hybrid_slam

@@ -14,13 +14,18 @@ namespace {
 
 std::unique_ptr<ImageSequence> open_layout(const fs::path& path, SequenceLayout layout,
                                            const std::string& name, SequenceCameras cameras,
-                                           TruthConvention convention) {
+                                           TruthConvention convention,
+                                           const InputOptions& options) {
   const bool any = layout == SequenceLayout::kAuto;
   std::unique_ptr<ImageSequence> sequence;
-  if (any || layout == SequenceLayout::kKitti) sequence = open_kitti(path, name);
-  if (!sequence && (any || layout == SequenceLayout::kEuroc)) sequence = open_euroc(path, name);
+  if (any || layout == SequenceLayout::kKitti) sequence = open_kitti(path, name, options);
+  if (!sequence && (any || layout == SequenceLayout::kKitti)) {
+    sequence = open_kitti_raw(path, name, options);
+  }
+  if (!sequence && (any || layout == SequenceLayout::kEuroc))
+    sequence = open_euroc(path, name, options);
   if (!sequence && (any || layout == SequenceLayout::kUwslam)) {
-    sequence = open_uwslam(path, name, cameras, convention);
+    sequence = open_uwslam(path, name, cameras, convention, options);
   }
   return sequence;
 }
@@ -43,11 +48,12 @@ const char* expected_files(SequenceLayout layout) {
 
 std::unique_ptr<ImageSequence> open_sequence(const std::string& path, SequenceLayout layout,
                                              const std::string& name, SequenceCameras cameras,
-                                             TruthConvention convention) {
+                                             TruthConvention convention,
+                                             const InputOptions& options) {
   cv::setNumThreads(1);  // OpenCV's setting is global; threads are the pipeline's to make
   try {
     if (!fs::is_directory(path)) throw InputError(path + ": no such folder");
-    auto sequence = open_layout(path, layout, name, cameras, convention);
+    auto sequence = open_layout(path, layout, name, cameras, convention, options);
     if (!sequence) {
       const std::string wanted = name.empty() ? "" : " of the name \"" + name + "\"";
       throw InputError(path + ": " + expected_files(layout) + wanted);

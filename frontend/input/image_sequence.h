@@ -10,6 +10,7 @@
 #include "cameras/files/input_error.h"
 #include "cameras/geometry/rigid3d.h"
 #include "frontend/features/image.h"
+#include "frontend/input/image_file.h"
 
 namespace hybrid_slam {
 
@@ -68,6 +69,13 @@ enum class SequenceLayout { kAuto, kKitti, kEuroc, kUwslam };
 // where that does not tell, world_from_cam, with a warning.
 enum class TruthConvention { kAuto, kWorldFromCam, kCamFromWorld };
 
+struct InputOptions {
+  ImageReading images;
+  // How far apart in time the images of a pair may be [s]. 0: a tenth of the frame period, at most
+  // 10 ms, in which a vehicle hardly moves.
+  double pair_tolerance = 0;
+};
+
 // Opens the sequence `name` of the dataset at `path`: the dataset's folder, the sequence's own, or
 // one between them. An empty name takes the only sequence, or the first with a warning.
 //
@@ -75,6 +83,7 @@ enum class TruthConvention { kAuto, kWorldFromCam, kCamFromWorld };
 // understood; times do not ascend; the calibration is not finite, not that of a rectified pair,
 // exchanged between left and right, or not for images of this size; there are no images, images
 // without a time, or more than half of the frames lack an image.
+// KITTI's layouts are those of odometry, grey or colour; a pair of EuRoC's cameras may be fisheyes.
 // Goes on with a line in SequenceInfo::warnings if fewer frames lack an image (reading those
 // throws), if times reach beyond the images (left out), if timestamps have no partner in the other
 // camera (left out), if the truth covers another number of frames, or if frames lack a fisheye
@@ -82,6 +91,7 @@ enum class TruthConvention { kAuto, kWorldFromCam, kCamFromWorld };
 std::unique_ptr<ImageSequence> open_sequence(const std::string& path, SequenceLayout layout,
                                              const std::string& name,
                                              SequenceCameras cameras = SequenceCameras::kStereo,
-                                             TruthConvention convention = TruthConvention::kAuto);
+                                             TruthConvention convention = TruthConvention::kAuto,
+                                             const InputOptions& options = {});
 
 }  // namespace hybrid_slam

@@ -46,8 +46,9 @@ void on_jpeg_message(j_common_ptr jpeg, int level) {
 }  // namespace
 
 // libjpeg reports errors by a jump to setjmp(): what is made after it here needs no destructor.
-std::string decode_jpeg(std::span<const std::uint8_t> file, const MakeRoom& make_room,
-                        GrayImage& image) {
+std::string decode_jpeg(std::span<const std::uint8_t> file, GrayChannel channel,
+                        const MakeRoom& make_room, DecodedImage& image) {
+  std::vector<std::uint8_t> colors;  // of a row; here, as a jump would pass its destructor by
   JpegErrors errors{};
   JpegReader reader;
   jpeg_decompress_struct& jpeg = reader.jpeg;
@@ -62,12 +63,18 @@ std::string decode_jpeg(std::span<const std::uint8_t> file, const MakeRoom& make
   jpeg_create_decompress(&jpeg);
   jpeg_mem_src(&jpeg, file.data(), static_cast<unsigned long>(file.size()));
   jpeg_read_header(&jpeg, TRUE);
-  make_room(jpeg.image_width, jpeg.image_height, image);
-  jpeg.out_color_space = JCS_GRAYSCALE;
+  make_room(jpeg.image_width, jpeg.image_height, image.gray);
+  const bool one_channel = channel != GrayChannel::kGrey && jpeg.num_components == 3;
+  jpeg.out_color_space = one_channel ? JCS_RGB : JCS_GRAYSCALE;
+  if (one_channel) colors.resize(3 * std::size_t{jpeg.image_width});
   jpeg_start_decompress(&jpeg);
   while (jpeg.output_scanline < jpeg.output_height) {
-    JSAMPROW row = image.row(static_cast<int>(jpeg.output_scanline));
+    std::uint8_t* const gray = image.gray.row(static_cast<int>(jpeg.output_scanline));
+    JSAMPROW row = one_channel ? colors.data() : gray;
     jpeg_read_scanlines(&jpeg, &row, 1);
+    for (std::size_t x = 0; 3 * x < colors.size(); ++x) {
+      gray[x] = gray_of(colors[3 * x], colors[3 * x + 1], colors[3 * x + 2], channel);
+    }
   }
   jpeg_finish_decompress(&jpeg);
   return {};

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "frontend/input/file_sequence.h"
@@ -5,7 +7,7 @@
 #include "frontend/input/text_file.h"
 
 // KITTI odometry: sequences/<id>/{image_0,image_1}/<number>.png, calib.txt, times.txt and, beside
-// sequences/, poses/<id>.txt.
+// sequences/, poses/<id>.txt. Of the colour images, image_2 and image_3.
 namespace hybrid_slam {
 
 namespace fs = std::filesystem;
@@ -14,8 +16,17 @@ namespace {
 
 constexpr double kMaxRelativeDifference = 1e-6;  // between the two cameras of a rectified pair
 
+using CameraPair = std::array<const char*, 2>;
+constexpr CameraPair kGrayPair{"image_0", "image_1"};
+constexpr CameraPair kColorPair{"image_2", "image_3"};
+
+// The line of calib.txt that has a camera's matrix.
+std::string label_of(const char* camera) { return "P" + std::string(camera).substr(6) + ":"; }
+
 bool is_kitti_sequence(const fs::path& folder) {
-  return fs::is_directory(folder / "image_0") || fs::is_directory(folder / "image_1");
+  const auto has = [&](const char* camera) { return fs::is_directory(folder / camera); };
+  return std::any_of(kGrayPair.begin(), kGrayPair.end(), has) ||
+         std::any_of(kColorPair.begin(), kColorPair.end(), has);
 }
 
 // The 3x4 matrix of the line that starts with `label`.
@@ -36,21 +47,35 @@ std::vector<double> projection_matrix(const std::vector<TextLine>& lines, const 
   throw InputError(path.string() + ": no line \"" + label + "\"");
 }
 
-Calibrated<RectifiedStereo> read_calibration(const fs::path& path, ImageSize size) {
+struct KittiCalibration {
+  Calibrated<RectifiedStereo> stereo;
+  Eigen::Vector3d left_in_cam0 = Eigen::Vector3d::Zero();  // [m]; the truth is that of camera 0
+};
+
+KittiCalibration read_calibration(const fs::path& path, const CameraPair& cameras, ImageSize size) {
   const std::vector<TextLine> lines = read_lines(path);
-  const std::vector<double> left = projection_matrix(lines, path, "P0:");
-  const std::vector<double> right = projection_matrix(lines, path, "P1:");
+  const std::string left_label = label_of(cameras[0]), right_label = label_of(cameras[1]);
+  const std::vector<double> left = projection_matrix(lines, path, left_label);
+  const std::vector<double> right = projection_matrix(lines, path, right_label);
   for (const std::size_t i : {0, 2, 5, 6}) {
     if (!(std::abs(left[i] - right[i]) <= kMaxRelativeDifference * std::abs(left[i]))) {
-      throw InputError(path.string() + ": P0 and P1 are not those of a rectified pair");
+      throw InputError(path.string() + ": " + left_label.substr(0, 2) + " and " +
+                       right_label.substr(0, 2) + " are not those of a rectified pair");
     }
   }
   const double baseline = (left[3] - right[3]) / left[0];
-  return make_stereo_camera(left[0], left[5], left[2], left[6], baseline, size, path.string());
+  KittiCalibration result;
+  result.stereo =
+      make_stereo_camera(left[0], left[5], left[2], left[6], baseline, size, path.string());
+  const double depth = left[11];  // P = K (I | t), t = left_from_cam0
+  result.left_in_cam0 = -Eigen::Vector3d((left[3] - left[2] * depth) / left[0],
+                                         (left[7] - left[6] * depth) / left[5], depth);
+  return result;
 }
 
 void read_truth(const fs::path& path, const NumberedFrames& frames, std::size_t rows_of_times,
-                SequenceInfo& info) {
+                const Eigen::Vector3d& left_in_cam0, SequenceInfo& info) {
+  const Rigid3d cam0_from_left(Eigen::Quaterniond::Identity(), left_in_cam0);
   const std::vector<NumberRow> rows = read_number_rows(path, ' ');
   if (rows.size() != rows_of_times) {
     info.warnings.push_back(path.string() + ": has " + std::to_string(rows.size()) + " poses for " +
@@ -58,35 +83,41 @@ void read_truth(const fs::path& path, const NumberedFrames& frames, std::size_t 
   }
   const std::size_t first = static_cast<std::size_t>(frames.first);
   for (std::size_t i = 0; i < frames.times.size() && first + i < rows.size(); ++i) {
-    info.truth.push_back({frames.times[i], kitti_pose(rows[first + i], path)});
+    info.truth.push_back({frames.times[i], kitti_pose(rows[first + i], path) * cam0_from_left});
   }
   info.truth_has_rotation = !info.truth.empty();
 }
 
 }  // namespace
 
-std::unique_ptr<ImageSequence> open_kitti(const fs::path& path, const std::string& name) {
+std::unique_ptr<ImageSequence> open_kitti(const fs::path& path, const std::string& name,
+                                          const InputOptions& options) {
   SequenceInfo info;
   const auto folder =
       choose_sequence(path, {path, path / "sequences"}, name, is_kitti_sequence, info.warnings);
   if (!folder) return nullptr;
   info.name = folder_name(*folder);
   info.layout = "kitti";
-  const NumberedImages left = list_numbered_images(*folder / "image_0", "");
-  const NumberedImages right = list_numbered_images(*folder / "image_1", "");
-  for (const auto& [images, side] : {std::pair(&left, "image_0"), std::pair(&right, "image_1")}) {
+  const bool has_gray =
+      fs::is_directory(*folder / "image_0") || fs::is_directory(*folder / "image_1");
+  const CameraPair& cameras = has_gray ? kGrayPair : kColorPair;
+  const NumberedImages left = list_numbered_images(*folder / cameras[0], "");
+  const NumberedImages right = list_numbered_images(*folder / cameras[1], "");
+  for (const auto& [images, side] : {std::pair(&left, cameras[0]), std::pair(&right, cameras[1])}) {
     if (images->empty()) throw InputError((*folder / side).string() + ": holds no images");
   }
   const std::vector<double> times = read_times(*folder / "times.txt", info.warnings);
   NumberedFrames frames = match_frames(times, *folder / "times.txt", left, right, info.warnings);
-  info.stereo = read_calibration(*folder / "calib.txt", first_image_size(frames.files));
+  const KittiCalibration calibration =
+      read_calibration(*folder / "calib.txt", cameras, first_image_size(frames.files));
+  info.stereo = calibration.stereo;
   const fs::path truth =
       fs::absolute(*folder).lexically_normal() / ".." / ".." / "poses" / (info.name + ".txt");
   if (fs::exists(truth.lexically_normal())) {
-    read_truth(truth.lexically_normal(), frames, times.size(), info);
+    read_truth(truth.lexically_normal(), frames, times.size(), calibration.left_in_cam0, info);
   }
   info.times = std::move(frames.times);
-  return std::make_unique<FileSequence>(std::move(info), std::move(frames.files), nullptr);
+  return std::make_unique<FileSequence>(std::move(info), std::move(frames.files), options, nullptr);
 }
 
 }  // namespace hybrid_slam

@@ -78,7 +78,7 @@ QuaternionOrder order_of_custom(const NumberTable& table, bool nanoseconds) {
 
 // The order of the quaternions in a table of 8 columns: `given`, or what the file tells.
 QuaternionOrder find_order(const NumberTable& table, bool nanoseconds, QuaternionOrder given,
-                           const fs::path& path, std::vector<std::string>& warnings) {
+                           const fs::path& path, std::vector<std::string>& notes) {
   if (given != QuaternionOrder::kUnknown) return given;
   const QuaternionOrder named = order_of_header(table.header);
   if (named != QuaternionOrder::kUnknown) return named;
@@ -94,8 +94,8 @@ QuaternionOrder find_order(const NumberTable& table, bool nanoseconds, Quaternio
                      "the quaternions may be x y z w or w x y z; say which by a header "
                      "(\"# t x y z qw qx qy qz\") or by an option (--help)");
   }
-  warnings.push_back(path.string() + ": quaternions read as " +
-                     (found == QuaternionOrder::kWxyz ? "w x y z" : "x y z w"));
+  notes.push_back(path.string() + ": quaternions read as " +
+                  (found == QuaternionOrder::kWxyz ? "w x y z" : "x y z w"));
   return found;
 }
 
@@ -108,20 +108,26 @@ Rigid3d pose_of(const NumberRow& row, QuaternionOrder order, const fs::path& pat
           position};
 }
 
-void check_columns(const NumberTable& table, const fs::path& path) {
+// All rows have as many columns as the first.
+void check_rows(const NumberTable& table, const fs::path& path) {
   if (table.rows.empty()) throw InputError(path.string() + ": holds no poses");
   const std::size_t columns = table.rows.front().values.size();
-  if (columns != kTumColumns && columns != kKittiColumns && columns != kEurocColumns) {
-    throw line_error(
-        path, table.rows.front().line,
-        "expected 8 columns (TUM) or 12 (KITTI) or 17 (EuRoC), found " + std::to_string(columns));
-  }
   for (const NumberRow& row : table.rows) {
     if (row.values.size() != columns) {
       throw line_error(path, row.line,
                        "expected " + std::to_string(columns) + " columns, found " +
                            std::to_string(row.values.size()));
     }
+  }
+}
+
+void check_columns(const NumberTable& table, const fs::path& path) {
+  check_rows(table, path);
+  const std::size_t columns = table.rows.front().values.size();
+  if (columns != kTumColumns && columns != kKittiColumns && columns != kEurocColumns) {
+    throw line_error(
+        path, table.rows.front().line,
+        "expected 8 columns (TUM) or 12 (KITTI) or 17 (EuRoC), found " + std::to_string(columns));
   }
 }
 
@@ -167,10 +173,24 @@ TrajectoryFile read_trajectory(const fs::path& path, QuaternionOrder order) {
   if (columns == kEurocColumns) {
     order = QuaternionOrder::kWxyz;
   } else {
-    order = find_order(table, nanoseconds, order, path, result.warnings);
+    order = find_order(table, nanoseconds, order, path, result.notes);
   }
-  if (nanoseconds) result.warnings.push_back(path.string() + ": times read as nanoseconds");
+  if (nanoseconds) result.notes.push_back(path.string() + ": times read as nanoseconds");
   read_stamped(table, order, nanoseconds, path, result);
+  return result;
+}
+
+TrajectoryFile read_euroc_poses(const fs::path& path) {
+  const NumberTable table = read_number_table(path, ' ');
+  check_rows(table, path);
+  if (table.rows.front().values.size() < kTumColumns) {
+    throw line_error(path, table.rows.front().line, "expected at least 8 columns");
+  }
+  TrajectoryFile result;
+  result.has_times = true;
+  const QuaternionOrder named = order_of_header(table.header);
+  const bool is_named = named != QuaternionOrder::kUnknown;
+  read_stamped(table, is_named ? named : QuaternionOrder::kWxyz, true, path, result);
   return result;
 }
 

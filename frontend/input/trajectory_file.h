@@ -14,7 +14,8 @@ enum class QuaternionOrder { kUnknown, kXyzw, kWxyz };
 struct TrajectoryFile {
   std::vector<StampedPose> poses;
   bool has_times = false;             // if not, the times are 0, 1, 2, ...
-  std::vector<std::string> warnings;  // how it was read, where that is not plain; what was left out
+  std::vector<std::string> notes;     // how it was read, where that is not plain
+  std::vector<std::string> warnings;  // what was left out
 };
 
 // Columns, blanks or commas between them:
@@ -32,5 +33,9 @@ struct TrajectoryFile {
 // none, or times descend.
 TrajectoryFile read_trajectory(const std::filesystem::path& path,
                                QuaternionOrder order = QuaternionOrder::kUnknown);
+
+// The same of a truth file in EuRoC's layout: nanoseconds, position, quaternion (w x y z unless a
+// header names another order), and whatever follows.
+TrajectoryFile read_euroc_poses(const std::filesystem::path& path);
 
 }  // namespace hybrid_slam

@@ -87,8 +87,9 @@ Calibrated<RectifiedStereo> read_calibration(const fs::path& place) {
 }
 
 // Checks it against an image, which also tells a size that the file may leave out.
-Calibrated<KannalaBrandt> read_fisheye_calibration(const fs::path& path, ImageSize image) {
-  Calibrated<KannalaBrandt> camera = read_fisheye(path.string());
+Calibrated<KannalaBrandt> read_fisheye_calibration(const fs::path& path, ImageSize image,
+                                                   std::vector<std::string>& warnings) {
+  Calibrated<KannalaBrandt> camera = read_fisheye(path.string(), &warnings);
   if (camera.width == 0) {
     camera.width = image.width;
     camera.height = image.height;
@@ -115,7 +116,7 @@ void add_fisheye(const fs::path& folder, const NumberedImages& images, SequenceC
   }
   add_fisheye_images(images, frames.first, frames.files, folder.string(), info.warnings);
   info.fisheye = read_fisheye_calibration(calibration_folder(folder) / "fisheye_calib.yaml",
-                                          first_readable_size(images));
+                                          first_readable_size(images), info.warnings);
 }
 
 // Positions only: "timestamp x y z", or "x y z" with row n belonging to index n.
@@ -130,13 +131,15 @@ void read_positions(const fs::path& path, const std::vector<double>& times, Sequ
     info.warnings.push_back(path.string() + ": has " + std::to_string(rows.size()) +
                             " positions for " + std::to_string(times.size()) + " times");
   }
+  const bool nanoseconds = columns == 4 && rows.back().values[0] >= kLeastNanoseconds;
+  if (nanoseconds) info.warnings.push_back(path.string() + ": times read as nanoseconds");
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::vector<double>& v = rows[i].values;
     if (v.size() != columns) {
       throw line_error(path, rows[i].line, "expected " + std::to_string(columns) + " numbers");
     }
     if (columns == 3 && i == times.size()) break;
-    const double time = columns == 4 ? v[0] : times[i];
+    const double time = columns == 4 ? v[0] * (nanoseconds ? 1e-9 : 1) : times[i];
     if (!info.truth.empty() && !(time > info.truth.back().time)) {
       throw line_error(path, rows[i].line, "times are not strictly ascending");
     }
@@ -148,7 +151,8 @@ void read_positions(const fs::path& path, const std::vector<double>& times, Sequ
 }  // namespace
 
 std::unique_ptr<ImageSequence> open_uwslam(const fs::path& path, const std::string& name,
-                                           SequenceCameras cameras, TruthConvention convention) {
+                                           SequenceCameras cameras, TruthConvention convention,
+                                           const InputOptions& options) {
   SequenceInfo info;
   const auto folder = choose_folder(path, name, info.warnings);
   if (!folder) return nullptr;
@@ -173,7 +177,7 @@ std::unique_ptr<ImageSequence> open_uwslam(const fs::path& path, const std::stri
     read_positions(*folder / "gt_poses.txt", times, info);
   }
   info.times = std::move(frames.times);
-  return std::make_unique<FileSequence>(std::move(info), std::move(frames.files), nullptr);
+  return std::make_unique<FileSequence>(std::move(info), std::move(frames.files), options, nullptr);
 }
 
 }  // namespace hybrid_slam

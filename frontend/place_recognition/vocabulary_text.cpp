@@ -1,6 +1,7 @@
 #include "frontend/place_recognition/vocabulary_text.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -94,6 +95,46 @@ Lines split_lines(std::string_view text, const std::string& name) {
   if (lines.begin.size() < 2) throw InputError(name + ": no vocabulary, or one without words");
   if (lines.begin.size() > kMaxLines) throw InputError(name + ": too many lines");
   return lines;
+}
+
+// What a file is that is no vocabulary of SIFT as text; empty if nothing tells.
+std::string other_kind(std::string_view text) {
+  using namespace std::string_view_literals;
+  struct Kind {
+    std::string_view begin;
+    const char* what;
+  };
+  constexpr std::array kKinds{Kind{"\x1f\x8b"sv, "is compressed (gzip): unpack it first"},
+                              Kind{"BZh"sv, "is compressed (bzip2): unpack it first"},
+                              Kind{"\xfd"
+                                   "7zXZ"sv,
+                                   "is compressed (xz): unpack it first"},
+                              Kind{"\x28\xb5\x2f\xfd"sv, "is compressed (zstd): unpack it first"},
+                              Kind{"PK\x03\x04"sv, "is a zip archive: unpack it first"},
+                              Kind{"%YAML"sv, "is a vocabulary as YAML: DBoW2's text is read"},
+                              Kind{"<?xml"sv, "is a vocabulary as XML: DBoW2's text is read"}};
+  for (const Kind& kind : kKinds) {
+    if (text.starts_with(kind.begin)) return kind.what;
+  }
+  if (text.size() > 262 && text.substr(257, 5) == "ustar")
+    return "is a tar archive: unpack it first";
+  if (text.substr(0, 64).find('\0') != std::string_view::npos) {
+    return "is a binary file, perhaps of ORB-SLAM, DBoW3 or fbow: DBoW2's text is read, and what "
+           "vocabulary_trainer writes";
+  }
+  return {};
+}
+
+// Of ORB, as ORB-SLAM's ORBvoc.txt: a node's line has parent, mark, 32 bytes and the weight.
+bool is_of_orb(std::string_view text) {
+  constexpr int kFields = 35;
+  const std::size_t begin = std::min(text.find('\n'), text.size() - 1) + 1;
+  const std::string_view node = text.substr(begin, text.find('\n', begin) - begin);
+  int fields = 0;
+  for (std::size_t i = 0; i < node.size(); ++i) {
+    if (!is_blank(node[i]) && (i == 0 || is_blank(node[i - 1]))) ++fields;
+  }
+  return fields == kFields;
 }
 
 class TextReader {
@@ -242,6 +283,13 @@ void append_number(std::string* line, float value) {
 }  // namespace
 
 Vocabulary read_vocabulary_text(std::string_view text, const std::string& name) {
+  std::string other = other_kind(text);
+  if (other.empty() && !text.empty() && is_of_orb(text)) {
+    other =
+        "is a vocabulary of ORB's descriptors of 32 bytes: one of SIFT's, of 128 numbers, is "
+        "needed";
+  }
+  if (!other.empty()) throw InputError(name + ": " + other);
   return TextReader(text, name).read();
 }
 

@@ -6,10 +6,72 @@
 #include <ceres/jet.h>
 #include <catch2/catch.hpp>
 
+#include "cameras/double_sphere.h"
+#include "cameras/extended_unified.h"
+#include "cameras/field_of_view.h"
+#include "cameras/radial_fisheye.h"
+#include "cameras/rational.h"
+#include "cameras/thin_prism_fisheye.h"
+#include "cameras/unified_radtan.h"
 #include "test/support/jacobian_check.h"
 #include "test/support/test_cameras.h"
 
 namespace hybrid_slam {
+
+template <>
+struct TestCamera<DoubleSphere> {
+  static Calibrated<DoubleSphere> camera() {
+    return {{218.5, 218.4, 512.7, 508.9, -0.27, 0.57}, 1024, 1024};
+  }
+};
+
+template <>
+struct TestCamera<ExtendedUnified> {
+  static Calibrated<ExtendedUnified> camera() {
+    return {{301.5, 300.4, 512.7, 508.9, 0.62, 1.1}, 1024, 1024};
+  }
+};
+
+template <>
+struct TestCamera<UnifiedRadtan> {
+  static Calibrated<UnifiedRadtan> camera() {
+    return {{1002.57, 1005.49, 512.7, 378.9, 2.044, -0.116, 0.453, -0.00037, -0.00034}, 1024, 768};
+  }
+};
+
+template <>
+struct TestCamera<Rational> {
+  static Calibrated<Rational> camera() {
+    return {{712.4, 709.1, 506.3, 391.7, -0.31, 0.12, 0.0011, -0.0007, -0.02, 0.014, -0.006, 0.001},
+            1024,
+            768};
+  }
+};
+
+template <>
+struct TestCamera<FieldOfView> {
+  static Calibrated<FieldOfView> camera() {
+    return {{512.4, 509.1, 506.3, 391.7, 0.93}, 1024, 768};
+  }
+};
+
+template <>
+struct TestCamera<RadialFisheye> {
+  static Calibrated<RadialFisheye> camera() {
+    return {{402.7, 514.9, 508.3, -0.0184, 0.0017}, 1024, 1024};
+  }
+};
+
+template <>
+struct TestCamera<ThinPrismFisheye> {
+  static Calibrated<ThinPrismFisheye> camera() {
+    return {{402.7, 402.4, 514.9, 508.3, -0.0184, 0.0017, 0.0004, -0.0003, -0.0003, 0.00002, 0.0005,
+             -0.0004},
+            1024,
+            1024};
+  }
+};
+
 namespace {
 
 template <typename M>
@@ -51,7 +113,8 @@ Projection<M> by_jets(const double* params, const Eigen::Vector3d& point) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("Models: analytic Jacobians against jets and numeric differences", "", Pinhole,
-                   RectifiedStereo, LeftOfStereo, KannalaBrandt, Radial, Bal) {
+                   RectifiedStereo, LeftOfStereo, KannalaBrandt, Radial, Bal, DoubleSphere,
+                   ExtendedUnified, UnifiedRadtan) {
   using M = TestType;
   Random random(11);
   const auto params = TestCamera<M>::camera().params;
@@ -80,7 +143,8 @@ TEMPLATE_TEST_CASE("Models: analytic Jacobians against jets and numeric differen
 }
 
 TEMPLATE_TEST_CASE("Models: unproject inverts project", "", Pinhole, RectifiedStereo, LeftOfStereo,
-                   KannalaBrandt, Radial, Bal) {
+                   KannalaBrandt, Radial, Bal, DoubleSphere, ExtendedUnified, UnifiedRadtan,
+                   Rational, FieldOfView, RadialFisheye, ThinPrismFisheye) {
   using M = TestType;
   Random random(12);
   const auto params = TestCamera<M>::camera().params;
@@ -96,7 +160,8 @@ TEMPLATE_TEST_CASE("Models: unproject inverts project", "", Pinhole, RectifiedSt
 }
 
 TEMPLATE_TEST_CASE("Models: what cannot be projected leaves the output untouched", "", Pinhole,
-                   RectifiedStereo, LeftOfStereo, KannalaBrandt, Radial, Bal) {
+                   RectifiedStereo, LeftOfStereo, KannalaBrandt, Radial, Bal, DoubleSphere,
+                   ExtendedUnified, UnifiedRadtan) {
   using M = TestType;
   const auto params = TestCamera<M>::camera().params;
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -275,6 +340,82 @@ TEST_CASE("Kannala-Brandt: unproject refuses pixels that no ray has, and nothing
   const double nan[2] = {std::numeric_limits<double>::quiet_NaN(), 0};
   CHECK_FALSE(KannalaBrandt::unproject(params, nan, bearing));
   CHECK_FALSE(Pinhole::unproject(params, nan, bearing));
+}
+
+TEST_CASE("Unified models: known values, and where they end") {
+  const double spheres[6] = {300, 200, 500, 400, 0, 0.5};   // r = 2 tan(theta / 2)
+  const double extended[6] = {300, 200, 500, 400, 0.5, 1};  // the same
+  const double radtan[9] = {600, 400, 500, 400, 1};         // r = tan(theta / 2)
+  for (const double theta : {0.3, 1.2, 1.7, 2.5}) {
+    const Eigen::Vector3d point(1.2 * std::sin(theta), 1.6 * std::sin(theta), 2 * std::cos(theta));
+    const double r = 2 * std::tan(theta / 2);
+    for (int model = 0; model < 3; ++model) {
+      CAPTURE(theta, model);
+      double pixel[2];
+      const bool projected = model == 0   ? DoubleSphere::project(spheres, point.data(), pixel)
+                             : model == 1 ? ExtendedUnified::project(extended, point.data(), pixel)
+                                          : UnifiedRadtan::project(radtan, point.data(), pixel);
+      REQUIRE(projected);
+      CHECK(pixel[0] == Approx(500 + 300 * 0.6 * r).epsilon(1e-12));
+      CHECK(pixel[1] == Approx(400 + 200 * 0.8 * r).epsilon(1e-12));
+    }
+  }
+  // xi = 1, alpha = 0.5: z > -w2 d1 with w2 = 2 / 2.
+  const double wide[6] = {300, 300, 500, 500, 1, 0.5};
+  double pixel[2], bearing[3];
+  const double behind[3] = {0.01, 0, -1};
+  CHECK(DoubleSphere::project(wide, behind, pixel));
+  // alpha = 0.6, xi = 0: z > -(2 / 3) d.
+  const double narrow[6] = {300, 300, 500, 500, 0, 0.6};
+  const auto sees = [&](double cosine) {
+    const double point[3] = {std::sqrt(1 - cosine * cosine), 0, cosine};
+    return DoubleSphere::project(narrow, point, pixel);
+  };
+  CHECK(sees(-0.66));
+  CHECK_FALSE(sees(-0.67));
+  const double outside[2] = {500 + 300 * 2.25, 500};  // r^2 <= 1 / (2 alpha - 1) = 5
+  CHECK_FALSE(DoubleSphere::unproject(narrow, outside, bearing));
+  const double nan[2] = {std::numeric_limits<double>::quiet_NaN(), 0};
+  CHECK_FALSE(DoubleSphere::unproject(narrow, nan, bearing));
+  CHECK_FALSE(ExtendedUnified::unproject(extended, nan, bearing));
+  CHECK_FALSE(UnifiedRadtan::unproject(radtan, nan, bearing));
+}
+
+TEST_CASE("COLMAP's wide models: known values") {
+  double pixel[2];
+  const double point[3] = {1, -2, 4};  // m = (0.25, -0.5), r^2 = 0.3125
+  const double r2 = 0.3125;
+  const double rational[12] = {500, 400, 320, 240, 0.1, 0.2, 0.01, 0.02, 0.3, 0.04, 0.05, 0.06};
+  REQUIRE(Rational::project(rational, point, pixel));
+  const double s = (1 + 0.1 * r2 + 0.2 * r2 * r2 + 0.3 * r2 * r2 * r2) /
+                   (1 + 0.04 * r2 + 0.05 * r2 * r2 + 0.06 * r2 * r2 * r2);
+  CHECK(pixel[0] == Approx(320 + 500 * (0.25 * s - 0.02 * 0.125 + 0.02 * (r2 + 2 * 0.0625))));
+  CHECK(pixel[1] == Approx(240 + 400 * (-0.5 * s + 0.01 * (r2 + 0.5) - 0.04 * 0.125)));
+
+  const double fov[5] = {500, 400, 320, 240, 0.9};
+  REQUIRE(FieldOfView::project(fov, point, pixel));
+  const double factor = std::atan(2 * std::sqrt(r2) * std::tan(0.45)) / (std::sqrt(r2) * 0.9);
+  CHECK(pixel[0] == Approx(320 + 500 * 0.25 * factor));
+  CHECK(pixel[1] == Approx(240 - 400 * 0.5 * factor));
+  const double pinhole[5] = {500, 400, 320, 240, 1e-9};
+  REQUIRE(FieldOfView::project(pinhole, point, pixel));
+  CHECK(pixel[0] == Approx(320 + 125));
+
+  const double theta = std::atan(std::sqrt(r2));
+  const double radial[5] = {500, 320, 240, 0.1, -0.05};
+  REQUIRE(RadialFisheye::project(radial, point, pixel));
+  const double theta_d = theta * (1 + 0.1 * theta * theta - 0.05 * std::pow(theta, 4));
+  CHECK(pixel[0] == Approx(320 + 500 * theta_d * 0.25 / std::sqrt(r2)));
+
+  const double prism[12] = {500, 400, 320, 240, 0.1, 0.2, 0.01, 0.02, 0.3, 0.04, 0.05, 0.06};
+  REQUIRE(ThinPrismFisheye::project(prism, point, pixel));
+  const double mx = theta * 0.25 / std::sqrt(r2), my = -theta * 0.5 / std::sqrt(r2),
+               t2 = theta * theta;
+  const double bend = 1 + 0.1 * t2 + 0.2 * t2 * t2 + 0.3 * std::pow(t2, 3) + 0.04 * std::pow(t2, 4);
+  CHECK(pixel[0] ==
+        Approx(320 + 500 * (mx * bend + 0.02 * mx * my + 0.02 * (t2 + 2 * mx * mx) + 0.05 * t2)));
+  CHECK(pixel[1] ==
+        Approx(240 + 400 * (my * bend + 0.01 * (t2 + 2 * my * my) + 0.04 * mx * my + 0.06 * t2)));
 }
 
 }  // namespace hybrid_slam

@@ -8,6 +8,11 @@
 
 #include <catch2/catch.hpp>
 
+#include "cameras/double_sphere.h"
+#include "cameras/extended_unified.h"
+#include "cameras/unified_radtan.h"
+#include "test/support/shared_cases.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -198,7 +203,11 @@ TEST_CASE("Kalibr camchain: values") {
 
 TEST_CASE("Kalibr camchain: each fault has its line") {
   CHECK(chain_error(replaced(kChain, "camera_model: pinhole", "camera_model: omni")) ==
-        "chain.yaml:2: cam0.camera_model: 'omni' is not supported (pinhole is)");
+        "chain.yaml:3: cam0.intrinsics: must have 5 numbers");
+  CHECK(chain_error(replaced(kChain, "camera_model: pinhole", "camera_model: ds")) ==
+        "chain.yaml:4: cam0.distortion_model: must be none with this camera_model");
+  CHECK(chain_error(replaced(kChain, "camera_model: pinhole", "camera_model: none")) ==
+        "chain.yaml:2: cam0.camera_model: 'none' is not supported (pinhole, ds, eucm, omni are)");
   CHECK(chain_error(replaced(kChain, "equidistant", "fov")) ==
         "chain.yaml:16: cam1.distortion_model: 'fov' is not supported (equidistant, radtan, none "
         "are)");
@@ -242,6 +251,168 @@ TEST_CASE("Fisheye: each fault has its line") {
         "fish.yaml:2: cam0: no camera of this chain is a fisheye (pinhole, equidistant)");
   CHECK(fisheye_error(replaced(kChain, "radtan", "equidistant")) ==
         "fish.yaml:9: cam1: is a second fisheye, and one is expected");
+}
+
+namespace {
+
+// A lens of every format, with what is said of it.
+struct Lens {
+  Calibrated<KannalaBrandt> camera;
+  std::vector<std::string> warnings;
+};
+
+Lens read_lens(const std::string& text) {
+  const Folder folder;
+  Lens lens;
+  lens.camera = read_fisheye(folder.write("lens.yaml", text), &lens.warnings);
+  return lens;
+}
+
+// The distance between the projections of two models, at most, over rays up to `limit` [rad].
+template <ProjectionModel A>
+double largest_difference(const std::array<double, A::kParamCount>& a,
+                          const Calibrated<KannalaBrandt>& b, double limit) {
+  double largest = 0;
+  for (int i = 0; i < 200; ++i) {
+    const double theta = limit * i / 200, phi = 2.4 * i;
+    const Eigen::Vector3d ray(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                              std::cos(theta));
+    Eigen::Vector2d by_a, by_b;
+    REQUIRE(A::project(a.data(), ray.data(), by_a.data()));
+    REQUIRE(KannalaBrandt::project(b.params.data(), ray.data(), by_b.data()));
+    largest = std::max(largest, (by_a - by_b).norm());
+  }
+  return largest;
+}
+
+}  // namespace
+
+TEST_CASE("Fisheye: formats of ORB-SLAM3, stella_vslam, Basalt and ROS 2") {
+  const std::string orbslam3 =
+      "%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"KannalaBrandt8\"\nCamera1.fx: 302.7\n"
+      "Camera1.fy: 302.4\nCamera1.cx: 514.9\nCamera1.cy: 508.3\nCamera1.k1: -0.0184\n"
+      "Camera1.k2: 0.0117\nCamera1.k3: -0.0093\nCamera1.k4: 0.0021\nCamera.width: 1024\n"
+      "Camera.height: 1023\n";
+  const std::string stella =
+      "Camera:\n  name: \"wrist\"\n  setup: \"monocular\"\n  model: \"fisheye\"\n  fx: 302.7\n"
+      "  fy: 302.4\n  cx: 514.9\n  cy: 508.3\n  k1: -0.0184\n  k2: 0.0117\n  k3: -0.0093\n"
+      "  k4: 0.0021\n  fps: 3.0\n  cols: 1024\n  rows: 1023\n  color_order: \"Gray\"\n";
+  const std::string basalt = R"({"value0": {"T_imu_cam": [{"px": 0, "py": 0, "pz": 0, "qx": 0,
+      "qy": 0, "qz": 0, "qw": 1}], "intrinsics": [{"camera_type": "kb4", "intrinsics":
+      {"fx": 302.7, "fy": 302.4, "cx": 514.9, "cy": 508.3, "k1": -0.0184, "k2": 0.0117,
+       "k3": -0.0093, "k4": 0.0021}}], "resolution": [[1024, 1023]]}})";
+  const std::string camera_info =
+      "header:\n  frame_id: wrist\nheight: 1023\nwidth: 1024\ndistortion_model: equidistant\n"
+      "d:\n- -0.0184\n- 0.0117\n- -0.0093\n- 0.0021\n"
+      "k: [302.7, 0.0, 514.9, 0.0, 302.4, 508.3, 0.0, 0.0, 1.0]\n---\nheight: 7\n";
+  for (const std::string& text : {orbslam3, stella, basalt, camera_info}) {
+    INFO(text);
+    const Lens lens = read_lens(text);
+    CHECK(lens.camera.params == kFisheye);
+    CHECK(lens.camera.width == 1024);
+    CHECK(lens.camera.height == 1023);
+    CHECK(lens.warnings.empty());
+  }
+  CHECK(fisheye_error(replaced(stella, "\"fisheye\"", "\"perspective\"")) ==
+        "fish.yaml:4: Camera.model: 'perspective' is no fisheye (fisheye is)");
+  CHECK(fisheye_error(replaced(basalt, "kb4", "pinhole")).find("no camera_type is that") !=
+        std::string::npos);
+  CHECK(fisheye_error(replaced(basalt, "[[1024, 1023]]", "[]")).find("must have 1 rows") !=
+        std::string::npos);
+  CHECK(fisheye_error(replaced(camera_info, "- 0.0021\n", "- 0.0021\n- 0\n")) ==
+        "fish.yaml:7: d: a fisheye has 4 of them");
+}
+
+TEST_CASE("Fisheye: double sphere, extended unified and omni become Kannala-Brandt") {
+  const auto chain = [](const std::string& model, const std::string& intrinsics,
+                        const std::string& distortion) {
+    return "cam0:\n  camera_model: " + model + "\n  intrinsics: " + intrinsics + "\n  " +
+           distortion + "\n  resolution: [1024, 1024]\n";
+  };
+  const std::string none = "distortion_model: none\n  distortion_coeffs: []";
+  const Lens ds = read_lens(chain("ds", "[-0.27, 0.57, 218.5, 218.4, 512.7, 508.9]", none));
+  CHECK(largest_difference<DoubleSphere>({218.5, 218.4, 512.7, 508.9, -0.27, 0.57}, ds.camera,
+                                         1.5) < 0.3);
+  REQUIRE(ds.warnings.size() == 1);
+  CHECK(ds.warnings[0].find("double sphere, taken as Kannala-Brandt") != std::string::npos);
+  const Lens eucm = read_lens(chain("eucm", "[0.62, 1.1, 301.5, 300.4, 512.7, 508.9]", none));
+  CHECK(largest_difference<ExtendedUnified>({301.5, 300.4, 512.7, 508.9, 0.62, 1.1}, eucm.camera,
+                                            1.4) < 0.3);
+  const Lens omni = read_lens(
+      chain("omni", "[1.2, 720, 721, 512.7, 508.9]",
+            "distortion_model: radtan\n  distortion_coeffs: [-0.02, 0.01, 0.0001, -0.0001]"));
+  CHECK(largest_difference<UnifiedRadtan>(
+            {720, 721, 512.7, 508.9, 1.2, -0.02, 0.01, 0.0001, -0.0001}, omni.camera, 1.3) < 0.5);
+  const std::string basalt = R"({"value0": {"intrinsics": [{"camera_type": "ds", "intrinsics":
+      {"fx": 218.5, "fy": 218.4, "cx": 512.7, "cy": 508.9, "xi": -0.27, "alpha": 0.57}}],
+      "resolution": [[1024, 1024]]}})";
+  CHECK(read_lens(basalt).camera.params == ds.camera.params);
+}
+
+TEST_CASE("Fisheye: a section of that name is the lens, and a small skew is said") {
+  const std::string blocks =
+      "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [0, 0, 0, 0]\n"
+      "  distortion_model: equidistant\n  intrinsics: [1000, 1000, 1224, 1024]\n"
+      "  resolution: [2448, 2048]\n"
+      "fisheye:\n  distortion_coeffs: [0.0227, -0.0134, 0.013, -0.0042]\n"
+      "  intrinsics: [774.7, 774.1, 1267.7, 1022.3]\n  resolution: [2448, 2048]\n";
+  const Lens lens = read_lens(blocks);
+  CHECK(lens.camera.params ==
+        std::array<double, 8>{774.7, 774.1, 1267.7, 1022.3, 0.0227, -0.0134, 0.013, -0.0042});
+  REQUIRE(lens.warnings.size() == 1);
+  CHECK(lens.warnings[0].find("took the section fisheye for the lens, not cam0") !=
+        std::string::npos);
+
+  const Lens skewed = read_lens(replaced(kOpenCv, "302.7, 0.", "302.7, -0.215"));
+  CHECK(skewed.camera.params == kFisheye);
+  REQUIRE(skewed.warnings.size() == 1);
+  CHECK(skewed.warnings[0].find(
+            "the skew of -0.215 px is left out; it moves the border by 0.36 px") !=
+        std::string::npos);
+  CHECK(read_lens(replaced(kOpenCv, "302.7, 0.", "302.7, 0.01")).warnings.empty());
+  CHECK(fisheye_error(replaced(kOpenCv, "302.7, 0.", "302.7, 30")).find("too much") !=
+        std::string::npos);
+
+  const Lens mixed =
+      read_lens(replaced(replaced(kChain, "pinhole", "omni"), "[460.0, 461.0, 365.0, 246.0]",
+                         "[1.2, 720, 721, 365, 246]"));
+  CHECK(mixed.camera.params == kFisheye);
+  REQUIRE(mixed.warnings.size() == 1);
+  CHECK(mixed.warnings[0].find("both cam1 and cam0 could be the fisheye; took cam1") !=
+        std::string::npos);
+}
+
+TEST_CASE("Fisheye: the cases as their users had them") {
+  const auto cases = shared_cases("calibration");
+  if (!cases) return;
+  const std::array<double, 8> wrist{302.734, 302.411, 514.862, 508.337,
+                                    -0.0184, 0.0117,  -0.0093, 0.0021};
+  for (const char* const name :
+       {"fisheye_calib.yaml", "kalibr_mixed_chain.yaml", "orbslam3_v1.yaml"}) {
+    INFO(name);
+    CHECK(read_fisheye(*cases / name).params == wrist);
+  }
+  CHECK(read_fisheye(*cases / "fisheye_two_blocks.yaml").params[0] == 774.7);
+  const auto ds = read_fisheye(*cases / "kalibr_ds.yaml");
+  CHECK(largest_difference<DoubleSphere>({218.5, 218.4, 512.7, 508.9, -0.27, 0.57}, ds, 1.5) < 0.3);
+  const auto stereo = read_ros_stereo((*cases / "left_camera.yaml").string(),
+                                      (*cases / "right_camera.yaml").string());
+  CHECK(stereo.params[4] == Approx(0.1502).margin(1e-6));
+}
+
+TEST_CASE("ROS stereo: CameraInfo messages") {
+  const auto info = [](const std::string& p3) {
+    return "height: 768\nwidth: 1024\ndistortion_model: plumb_bob\nd: [0, 0, 0, 0, 0]\n"
+           "k: [870, 0, 500, 0, 870, 390, 0, 0, 1]\nr: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+           "p: [868.4, 0, 506.3, " +
+           p3 + ", 0, 868.5, 391.7, 0, 0, 0, 1, 0]\n---\n";
+  };
+  const Folder folder;
+  const auto stereo = read_ros_stereo(folder.write("left.yaml", info("0")),
+                                      folder.write("right.yaml", info("-130.26")));
+  CHECK(stereo.params[1] == 868.5);
+  CHECK(stereo.params[4] == Approx(0.15));
+  CHECK(stereo.height == 768);
 }
 
 TEST_CASE("Calibration of the rendered underwater dataset") {

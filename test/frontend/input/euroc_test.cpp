@@ -1,8 +1,10 @@
 #include <cmath>
+#include <sstream>
 
 #include <catch2/catch.hpp>
 
 #include "cameras/geometry/rigid3d.h"
+#include "cameras/kannala_brandt.h"
 #include "test/frontend/input/dataset_writer.h"
 
 namespace hybrid_slam {
@@ -204,6 +206,148 @@ TEST_CASE("EuRoC frames are matched by time") {
   CHECK(complaint([&] { holed->read(4); }).empty());
 }
 
+// The clock of the right camera put off by so many ns, and every `keep`th of its images kept.
+void rewrite_right_list(const fs::path& root, std::int64_t offset, int keep = 1) {
+  std::ostringstream list;
+  list << "timestamp,filename,exposure\n";
+  for (int i = 0; i < kFrames; i += keep) {
+    list << '"' << stamp(i) + offset << "\"," << stamp(i) << ".png,0.01,\n";
+  }
+  write_text(root / "mav0/cam1/data.csv", list.str());
+}
+
+TEST_CASE("EuRoC cameras out of step are paired, and said to be") {
+  const TempFolder folder;
+  write_euroc(folder.path());
+  const auto open = [&](double tolerance) {
+    InputOptions options;
+    options.pair_tolerance = tolerance;
+    return open_sequence(folder.path().string(), SequenceLayout::kAuto, "",
+                         SequenceCameras::kStereo, TruthConvention::kAuto, options);
+  };
+  for (const std::int64_t offset : {4'000'000, -12'000'000}) {
+    rewrite_right_list(folder.path(), offset);
+    const auto sequence = open(0);
+    CHECK(sequence->size() == kFrames);
+    CHECK(sequence->info().times[0] == Approx(static_cast<double>(stamp(0)) * 1e-9).epsilon(1e-15));
+    REQUIRE(sequence->info().warnings.size() == 1);
+    CHECK(sequence->info().warnings[0].find(offset > 0 ? "cam1's times are 4 ms later"
+                                                       : "cam1's times are -12 ms later") !=
+          std::string::npos);
+  }
+  rewrite_right_list(folder.path(), 0, 2);
+  CHECK(open(0)->size() == kFrames / 2);
+  // Differences that are not one offset: 0, 3, 6 ... ms; the tolerance is 5 ms, or as given.
+  std::string list;
+  for (int i = 0; i < kFrames; ++i) {
+    list += std::to_string(stamp(i) + 3'000'000LL * i) + "," + std::to_string(stamp(i)) + ".png\n";
+  }
+  write_text(folder.path() / "mav0/cam1/data.csv", list);
+  CHECK(open(0)->size() == 2);
+  CHECK(open(0.0071)->size() == 3);
+}
+
+TEST_CASE("EuRoC distortions by their other names and lengths") {
+  const TempFolder folder;
+  write_euroc(folder.path());
+  const auto plain = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  const auto rewrite = [&](const std::string& name, const std::string& more) {
+    for (int side = 0; side < 2; ++side) {
+      const fs::path file = folder.path() / "mav0" / ("cam" + std::to_string(side)) / "sensor.yaml";
+      const std::string text = sensor_yaml(raw_model(side));  // ends with "]\n"
+      std::ostringstream changed;
+      changed << std::string_view(text).substr(0, text.size() - 2) << more << "]\n";
+      write_text(file, changed.str());
+      replace_text(file, "radial-tangential", name);
+    }
+  };
+  for (const auto& [name, more] : {std::pair("plumb_bob", ", 0.0"), std::pair("radtan", ""),
+                                   std::pair("rational_polynomial", ", 0.0, 0.0, 0.0, 0.0")}) {
+    INFO(name);
+    rewrite(name, more);
+    const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+    CHECK(sequence->info().stereo.params[0] == Approx(plain->info().stereo.params[0]));
+    CHECK(sequence->read(2).left.pixels == plain->read(2).left.pixels);
+  }
+  rewrite("plumb_bob", ", 0.0, 0.0");
+  CHECK(open_complaint(folder.path()).find("must have 4, 5 or 8 numbers") != std::string::npos);
+}
+
+// Stereo of two fisheyes, as TUM-VI has it: a camchain, images without sensor.yaml.
+TEST_CASE("a pair of fisheyes is rectified to a stated field of view") {
+  const TempFolder folder;
+  const fs::path mav = folder.path() / "mav0";
+  const std::array<double, 8> lens{100, 101, 159, 121, 0.01, -0.004, 0.001, 0};
+  const Rigid3d right_from_left(
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.03, Eigen::Vector3d(1, 2, 1).normalized())),
+      Eigen::Vector3d(-0.1, 0.002, 0.001));
+  for (int side = 0; side < 2; ++side) {
+    cv::Mat image(kHeight, kWidth, CV_64FC1, cv::Scalar(20));
+    for (const Eigen::Vector3d& point : scene()) {
+      const Eigen::Vector3d in_cam = side == 0 ? point : right_from_left * point;
+      Eigen::Vector2d centre;
+      REQUIRE(KannalaBrandt::project(lens.data(), in_cam.data(), centre.data()));
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          const double r2 = (Eigen::Vector2d(x, y) - centre).squaredNorm();
+          image.at<double>(y, x) += 200 * std::exp(-r2 / (2 * 1.5 * 1.5));
+        }
+      }
+    }
+    cv::Mat bytes;
+    image.convertTo(bytes, CV_8UC1);
+    const fs::path camera = mav / ("cam" + std::to_string(side));
+    write_picture(camera / "data/1000000000.png", bytes);
+    write_text(camera / "data.csv", "#timestamp [ns],filename\n1000000000,1000000000.png\n");
+  }
+  const Eigen::Matrix3d r = right_from_left.rotation().toRotationMatrix();
+  const Eigen::Vector3d t = right_from_left.translation();
+  std::string chain;
+  for (int side = 0; side < 2; ++side) {
+    chain += cv::format("cam%d:\n  camera_model: pinhole\n  distortion_model: equidistant\n", side);
+    chain += "  intrinsics: [100, 101, 159, 121]\n  distortion_coeffs: [0.01, -0.004, 0.001, 0]\n";
+    chain += "  resolution: [320, 240]\n";
+    if (side == 0) continue;
+    chain += "  T_cn_cnm1:\n";
+    for (int i = 0; i < 3; ++i) {
+      chain += cv::format("  - [%.12f, %.12f, %.12f, %.12f]\n", r(i, 0), r(i, 1), r(i, 2), t[i]);
+    }
+    chain += "  - [0.0, 0.0, 0.0, 1.0]\n";
+  }
+  write_text(folder.path() / "dso/camchain.yaml", chain);
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  const SequenceInfo& info = sequence->info();
+  REQUIRE(info.warnings.size() == 1);
+  CHECK(info.warnings[0].find("rectified to a field of view of") != std::string::npos);
+  CHECK(info.stereo.params[4] == Approx(t.norm()));
+  CHECK(info.stereo.params[0] >= 100);
+  const FrameImages images = sequence->read(0);
+  // The same point in the same row of both, and at its depth.
+  const auto& [fx, fy, cx, cy, baseline] = info.stereo.params;
+  int seen = 0;
+  for (const Eigen::Vector3d& point : scene()) {
+    // Rectified axes: x along the baseline.
+    const Eigen::Vector3d x = inverse(right_from_left).translation().normalized();
+    const Eigen::Vector3d ahead =
+        Eigen::Vector3d::UnitZ() + r.transpose() * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d y = ahead.cross(x).normalized();
+    const Eigen::Vector3d in_rectified(x.dot(point), y.dot(point), x.cross(y).dot(point));
+    const double z = in_rectified.z();
+    const Eigen::Vector2d expected(fx * in_rectified.x() / z + cx, fy * in_rectified.y() / z + cy);
+    if (!(expected.x() > 12 && expected.x() < kWidth - 12 && expected.y() > 12 &&
+          expected.y() < kHeight - 12)) {
+      continue;
+    }
+    const double disparity = fx * baseline / z;
+    CHECK((blob_centre(images.left, expected) - expected).norm() < 0.35);
+    CHECK((blob_centre(images.right, expected - Eigen::Vector2d(disparity, 0)) - expected +
+           Eigen::Vector2d(disparity, 0))
+              .norm() < 0.35);
+    ++seen;
+  }
+  CHECK(seen >= 9);
+}
+
 TEST_CASE("an EuRoC dataset that cannot be used is refused with one line") {
   const TempFolder folder;
   write_euroc(folder.path());
@@ -238,8 +382,8 @@ TEST_CASE("an EuRoC dataset that cannot be used is refused with one line") {
     expected = "the focal length is not positive";
   }
   SECTION("another model") {
-    replace_text(mav / "cam0/sensor.yaml", "radial-tangential", "equidistant");
-    expected = "distortion_model: only radial-tangential is supported";
+    replace_text(mav / "cam0/sensor.yaml", "radial-tangential", "fov");
+    expected = "distortion_model: 'fov' is not supported (radial-tangential, plumb_bob";
   }
   SECTION("another image size") {
     replace_text(mav / "cam0/sensor.yaml", "[320, 240]", "[640, 480]");
@@ -263,7 +407,7 @@ TEST_CASE("an EuRoC dataset that cannot be used is refused with one line") {
     std::string list;
     for (int i = 0; i < kFrames; ++i) list += std::to_string(i + 1) + ",x.png\n";
     write_text(mav / "cam1/data.csv", list);
-    expected = "no timestamps in common";
+    expected = "no timestamps in common: the least difference is -1.4e+12 ms, the tolerance ";
   }
   SECTION("most images missing") {
     fs::remove_all(mav / "cam1/data");

@@ -141,6 +141,83 @@ TEST_CASE("colour becomes grey and 16 bits become 8") {
   CHECK(holds(read_gray_image(folder.path() / "wide.png", kSize), picture));
 }
 
+TEST_CASE("10 and 12 bits in 16 become the 8 that they are meant to be") {
+  const TempFolder folder;
+  const cv::Mat picture = test_picture(kSize.width, kSize.height, 2);  // up to 250
+  for (const int bits : {10, 12, 14}) {
+    cv::Mat wide;
+    picture.convertTo(wide, CV_16UC1, 1 << (bits - 8));
+    for (const char* const name : {"wide.png", "wide.tif", "wide.pgm"}) {
+      CAPTURE(bits, name);
+      write_picture(folder.path() / name, wide);
+      const int white = (1 << bits) - 1;
+      CHECK(white_above(highest_wide_sample(folder.path() / name)) == white);
+      CHECK(holds(read_gray_image(folder.path() / name, kSize), picture));
+      CHECK(holds(read_gray_image(folder.path() / name, {GrayChannel::kGrey, white}), picture));
+      const GrayImage dark = read_gray_image(folder.path() / name, {GrayChannel::kGrey, 65535});
+      CHECK(dark.pixels[77] == picture.at<std::uint8_t>(77) >> (16 - bits));
+    }
+  }
+  write_picture(folder.path() / "plain.png", picture);
+  CHECK(highest_wide_sample(folder.path() / "plain.png") == 0);
+}
+
+TEST_CASE("TIFF, PGM, PPM and BMP give the pixels that were written") {
+  const TempFolder folder;
+  const cv::Mat picture = test_picture(kSize.width, kSize.height, 3);
+  cv::Mat colour(kSize.height, kSize.width, CV_8UC3);
+  cv::RNG(5).fill(colour, cv::RNG::UNIFORM, 0, 256);
+  for (const char* const name : {"a.tif", "a.tiff", "a.pgm", "a.bmp"}) {
+    CAPTURE(name);
+    write_picture(folder.path() / name, picture);
+    CHECK(has_image_extension(folder.path() / name));
+    CHECK(holds(read_gray_image(folder.path() / name, kSize), picture));
+  }
+  REQUIRE(cv::imwrite((folder.path() / "text.pgm").string(), picture, {cv::IMWRITE_PXM_BINARY, 0}));
+  CHECK(holds(read_gray_image(folder.path() / "text.pgm", kSize), picture));
+  cv::Mat channels[3];
+  cv::split(colour, channels);  // blue, green, red
+  for (const char* const name : {"a.tif", "a.ppm", "a.bmp", "a.png"}) {
+    CAPTURE(name);
+    write_picture(folder.path() / name, colour);
+    const GrayImage grey = read_gray_image(folder.path() / name, kSize);
+    for (std::size_t i = 0; i < grey.pixels.size(); ++i) {
+      const cv::Vec3b& bgr = colour.at<cv::Vec3b>(static_cast<int>(i));
+      const double weighed = 0.114 * bgr[0] + 0.587 * bgr[1] + 0.299 * bgr[2];
+      if (!(std::abs(grey.pixels[i] - weighed) <= 1.01)) FAIL(i << ": " << weighed);
+    }
+    CHECK(holds(read_gray_image(folder.path() / name, {GrayChannel::kBlue, 0}), channels[0]));
+    CHECK(holds(read_gray_image(folder.path() / name, {GrayChannel::kGreen, 0}), channels[1]));
+    CHECK(holds(read_gray_image(folder.path() / name, {GrayChannel::kRed, 0}), channels[2]));
+  }
+  write_picture(folder.path() / "a.jpg", colour);
+  const cv::Mat decoded = cv::imread((folder.path() / "a.jpg").string(), cv::IMREAD_COLOR);
+  cv::split(decoded, channels);
+  CHECK(holds(read_gray_image(folder.path() / "a.jpg", {GrayChannel::kGreen, 0}), channels[1]));
+  cv::Mat wide;
+  colour.convertTo(wide, CV_16UC3, 16);
+  write_picture(folder.path() / "wide.png", wide);
+  cv::split(colour, channels);
+  CHECK(holds(read_gray_image(folder.path() / "wide.png", {GrayChannel::kRed, 4095}), channels[2]));
+}
+
+TEST_CASE("TIFF, PGM and BMP that are cut anywhere are refused") {
+  const TempFolder folder;
+  const cv::Mat picture = test_picture(kSize.width, kSize.height, 3);
+  for (const char* const name : {"a.tif", "a.pgm", "a.bmp"}) {
+    write_picture(folder.path() / name, picture);
+    const std::string whole = read_text(folder.path() / name);
+    const auto part = folder.path() / (std::string("part_") + name);
+    for (std::size_t length = 0; length < whole.size(); length += 1 + whole.size() / 60) {
+      CAPTURE(name, length, whole.size());
+      write_text(part, whole.substr(0, length));
+      GrayImage image;
+      const std::string line = complaint([&] { image = read_gray_image(part, kSize); });
+      CHECK((!line.empty() || holds(image, picture)));
+    }
+  }
+}
+
 TEST_CASE("a file truncated at any length is refused") {
   const TempFolder folder;
   cv::Mat noise(kSize.height, kSize.width, CV_8UC1);

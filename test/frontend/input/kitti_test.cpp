@@ -220,6 +220,139 @@ TEST_CASE("a KITTI dataset that cannot be used is refused with one line") {
   CHECK(line.find(expected) != std::string::npos);
 }
 
+TEST_CASE("white is found over the sequence, and darkness is said") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  const fs::path sequence = folder.path() / "sequences/07";
+  const auto rewrite = [&](int factor, int divisor) {
+    for (const auto& entry : fs::recursive_directory_iterator(sequence)) {
+      if (entry.path().extension() != ".png") continue;
+      cv::Mat wide;
+      const cv::Mat picture = cv::imread(entry.path().string(), cv::IMREAD_UNCHANGED);
+      picture.convertTo(wide, CV_16UC1, static_cast<double>(factor) / divisor);
+      write_picture(entry.path(), wide);
+    }
+  };
+  const GrayImage plain =
+      open_sequence(folder.path().string(), SequenceLayout::kAuto, "")->read(1).left;
+  rewrite(16, 1);
+  const auto twelve = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  REQUIRE(twelve->info().warnings.size() == 1);
+  CHECK(twelve->info().warnings[0].find("4095 is taken for white") != std::string::npos);
+  CHECK(twelve->read(1).left.pixels == plain.pixels);
+  InputOptions options;
+  options.images.white = 65535;
+  const auto dark = open_sequence(folder.path().string(), SequenceLayout::kAuto, "",
+                                  SequenceCameras::kStereo, TruthConvention::kAuto, options);
+  REQUIRE(dark->info().warnings.size() == 1);
+  CHECK(dark->info().warnings[0].find("the left images are dark: mean brightness 7") !=
+        std::string::npos);
+  rewrite(0, 1);
+  const auto black = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  CHECK(black->info().warnings.back().find("the left images are black") != std::string::npos);
+}
+
+TEST_CASE("KITTI's colour images, with truth of their own camera") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  const fs::path sequence = folder.path() / "sequences/07";
+  const auto grey = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  const FrameImages images = grey->read(1);
+  fs::rename(sequence / "image_0", sequence / "image_2");
+  fs::rename(sequence / "image_1", sequence / "image_3");
+  const auto& [fx, fy, cx, cy, baseline] = grey->info().stereo.params;
+  // As in KITTI's own files: 0.06 m left of camera 0, and a few mm up and ahead.
+  const Eigen::Vector3d t(0.06, -0.001, 0.003);
+  std::string text = read_text(sequence / "calib.txt");
+  for (const int camera : {2, 3}) {
+    const double x = t.x() - (camera == 3 ? baseline : 0);
+    text += cv::format("P%d: %.9f 0 %.9f %.9f 0 %.9f %.9f %.9f 0 0 1 %.9f\n", camera, fx, cx,
+                       fx * x + cx * t.z(), fy, cy, fy * t.y() + cy * t.z(), t.z());
+  }
+  write_text(sequence / "calib.txt", text);
+  const auto colour = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  CHECK(colour->info().stereo.params[4] == Approx(baseline));
+  CHECK(colour->read(1).left.pixels == images.left.pixels);
+  CHECK(colour->read(1).right.pixels == images.right.pixels);
+  REQUIRE(colour->info().truth.size() == grey->info().truth.size());
+  const Rigid3d cam0_from_left =
+      inverse(grey->info().truth[1].world_from_cam) * colour->info().truth[1].world_from_cam;
+  CHECK((cam0_from_left.translation() + t).norm() < 1e-6);
+}
+
+// A drive of two frames of KITTI raw, or of KITTI-360 below `root`.
+void write_drive(const fs::path& drive, const char* data) {
+  for (int side = 0; side < 2; ++side) {
+    const fs::path camera = drive / (side == 0 ? "image_00" : "image_01");
+    for (int i = 0; i < 2; ++i) {
+      write_picture(camera / data / (i == 0 ? "0000000000.png" : "0000000001.png"),
+                    test_picture(60, 40, 2 * i + side));
+    }
+    write_text(camera / "timestamps.txt",
+               "2011-09-26 13:02:25.964389445\n2011-09-26 13:02:26.067689445\n");
+  }
+}
+
+const char* const kRawCalibration =
+    "calib_time: 09-Jan-2012 13:57:47\nR_rect_00: 1 0 0 0 1 0 0 0 1\n"
+    "P_rect_00: 700 0 30 0 0 700 20 0 0 0 1 0\nP_rect_01: 700 0 30 -350 0 700 20 0 0 0 1 0\n";
+
+TEST_CASE("KITTI raw opens, with truth from its GPS and IMU") {
+  const TempFolder folder;
+  const fs::path date = folder.path() / "2011_09_26", drive = date / "2011_09_26_drive_0001_sync";
+  write_drive(drive, "data");
+  write_text(date / "calib_cam_to_cam.txt", kRawCalibration);
+  // The camera looks along the IMU's x (forward), its x is the IMU's -y, 0.5 m ahead of the IMU.
+  write_text(date / "calib_velo_to_cam.txt", "R: 0 -1 0 0 0 -1 1 0 0\nT: 0 0 -0.5\n");
+  write_text(date / "calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n");
+  // North-east by some metres, heading north (yaw 90 degrees).
+  write_text(drive / "oxts/data/0000000000.txt", "49.0 8.4 112 0 0 1.5707963267948966 0 0\n");
+  write_text(drive / "oxts/data/0000000001.txt",
+             "49.00002 8.40001 113 0 0 1.5707963267948966 0 0\n");
+  for (const fs::path& path : {drive, date}) {
+    const auto sequence = open_sequence(path.string(), SequenceLayout::kAuto, "");
+    const SequenceInfo& info = sequence->info();
+    CHECK(info.layout == "kitti");
+    CHECK(info.warnings.empty());
+    CHECK(info.stereo.params == std::array<double, 5>{700, 700, 30, 20, 0.5});
+    CHECK(info.times[0] == Approx(1317042145.964389445).epsilon(1e-15));
+    CHECK(info.times[1] - info.times[0] == Approx(0.1033).epsilon(1e-5));
+    CHECK(holds(sequence->read(1).right, test_picture(60, 40, 3)));
+    REQUIRE(info.truth.size() == 2);
+    const Eigen::Vector3d moved =
+        info.truth[1].world_from_cam.translation() - info.truth[0].world_from_cam.translation();
+    const double degree = 6378137 * M_PI / 180;  // [m] of latitude
+    CHECK(moved.x() == Approx(1e-5 * degree * std::cos(49 * M_PI / 180)).epsilon(1e-4));
+    CHECK(moved.y() == Approx(2e-5 * degree).epsilon(1e-4));
+    CHECK(moved.z() == Approx(1));
+    // Ahead of the camera is north, and the camera is 0.5 m north of the IMU.
+    const Rigid3d& first = info.truth[0].world_from_cam;
+    CHECK((first.rotation() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitY()).norm() < 1e-9);
+    CHECK((first.translation() - Eigen::Vector3d(0, 0.5, 0)).norm() < 1e-9);
+  }
+  write_text(drive / "image_00/timestamps.txt", "2011-13-26 13:02:25.9\n");
+  CHECK(open_complaint(drive).find("timestamps.txt:1: no such day") != std::string::npos);
+  write_text(drive / "image_00/timestamps.txt", "25.9\n26.0\n");
+  CHECK(open_complaint(drive).find("timestamps.txt:1: expected a time such as") !=
+        std::string::npos);
+}
+
+TEST_CASE("KITTI-360's perspective images open, with truth") {
+  const TempFolder folder;
+  const fs::path drive = folder.path() / "data_2d_raw/2013_05_28_drive_0000_sync";
+  write_drive(drive, "data_rect");
+  write_text(folder.path() / "calibration/perspective.txt", kRawCalibration);
+  write_text(folder.path() / "data_poses/2013_05_28_drive_0000_sync/cam0_to_world.txt",
+             "1 0 -1 0 7 1 0 0 8 0 0 1 9 0 0 0 1\n");
+  for (const fs::path& path : {folder.path(), drive}) {
+    const auto sequence = open_sequence(path.string(), SequenceLayout::kAuto, "");
+    REQUIRE(sequence->info().truth.size() == 1);
+    CHECK(sequence->info().truth[0].time == sequence->info().times[1]);
+    CHECK(sequence->info().truth[0].world_from_cam.translation() == Eigen::Vector3d(7, 8, 9));
+    CHECK(holds(sequence->read(0).left, test_picture(60, 40, 0)));
+  }
+}
+
 TEST_CASE("a folder in no layout is refused") {
   const TempFolder folder;
   CHECK(open_complaint(folder.path()).find("no sequence in a known layout") != std::string::npos);

@@ -176,6 +176,50 @@ TEST_CASE("the convention of camera_poses.txt is found or told") {
   CHECK((first_truth(TruthConvention::kWorldFromCam, "world_from_cam") - inverted).norm() < 1e-6);
 }
 
+TEST_CASE("UWslam's truth as its own scripts take it") {
+  const TempFolder folder;
+  write_stereo(folder.path());
+  write_text(folder.path() / "stereo/gt_poses.txt",
+             "1403636579000000000,1,5,6\n1403636579200000000,2,5,6\n");
+  const auto positions = open_sequence(folder.path().string(), SequenceLayout::kAuto, "stereo");
+  REQUIRE(positions->info().truth.size() == 2);
+  CHECK(positions->info().truth[1].time == Approx(1403636579.2).epsilon(1e-12));
+  REQUIRE(!positions->info().warnings.empty());
+  CHECK(positions->info().warnings[0].find("times read as nanoseconds") != std::string::npos);
+
+  const TempFolder hybrid;
+  write_hybrid(hybrid.path());
+  write_text(hybrid.path() / "hybrid/M1/camera_poses.txt",
+             "1,1,2,3,1,0,0,0\n3,4,5,6,0.6,0.8,0,0\n");
+  const auto handles = open_sequence(hybrid.path().string(), SequenceLayout::kAuto, "M1");
+  const SequenceInfo& info = handles->info();
+  CHECK(info.truth.empty());
+  REQUIRE(info.fisheye_truth.size() == 2);
+  CHECK(info.fisheye_truth[1].time == info.times[3]);
+  CHECK(info.fisheye_truth[1].world_from_cam.translation() == Eigen::Vector3d(4, 5, 6));
+  CHECK(info.fisheye_truth[1].world_from_cam.rotation().x() == Approx(0.8));
+  REQUIRE(info.warnings.size() == 1);
+  CHECK(info.warnings[0].find("poses of the fisheye alone") != std::string::npos);
+}
+
+TEST_CASE("a wide baseline and slow times are doubted") {
+  const TempFolder folder;
+  write_hybrid(folder.path());
+  for (const char* const name : {"left_camera.yaml", "right_camera.yaml"}) {
+    const double p3 = std::string(name) == "left_camera.yaml" ? 0 : -12000;  // 150 m at f = 80
+    write_text(folder.path() / "hybrid/calibration" / name, ros_camera(p3));
+  }
+  std::string times;
+  for (int i = 0; i < kFrames; ++i) times += std::to_string(333333333LL * i) + "\n";
+  write_text(folder.path() / "hybrid/M1/times.txt", times);
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "M1");
+  const std::vector<std::string>& warnings = sequence->info().warnings;
+  REQUIRE(warnings.size() == 2);
+  CHECK(warnings[0].find("the baseline is 150 m: is the calibration in millimetres?") !=
+        std::string::npos);
+  CHECK(warnings[1].find("frames are 3.33333e+08 s apart") != std::string::npos);
+}
+
 TEST_CASE("a UWslam dataset that cannot be used is refused with one line") {
   const TempFolder folder;
   write_hybrid(folder.path());

@@ -11,6 +11,7 @@
 #include "cameras/files/output_file.h"
 #include "test/frontend/place_recognition/sample_vocabulary.h"
 #include "test/support/allocation_watch.h"
+#include "test/support/shared_cases.h"
 #include "test/support/temp_folder.h"
 
 namespace hybrid_slam {
@@ -90,6 +91,28 @@ TEST_CASE("What is no vocabulary is told so") {
   CHECK_THROWS_AS(load_vocabulary(folder.path()), InputError);
   CHECK_THROWS_AS(read_vocabulary("", "nothing"), InputError);
   CHECK_THROWS_AS(read_vocabulary("10 6 0 0\n", "text"), InputError);
+}
+
+TEST_CASE("Vocabularies of other programs are named for what they are") {
+  using namespace std::string_literals;
+  const auto named = [](const std::string& content, const std::string& as) {
+    const std::string reason = complaint(content);
+    INFO(reason);
+    CHECK(reason.find(as) != std::string::npos);
+  };
+  named("\x1f\x8b\x08\0\0\0\0\0"s + "whatever", "gzip");
+  named("BZh91AY&SY", "bzip2");
+  named("PK\x03\x04"s + std::string(40, 'x'), "zip archive");
+  named("ORBvoc.txt" + std::string(247, '\0') + "ustar" + std::string(250, '\0'), "tar archive");
+  named("%YAML:1.0\nvocabulary:\n   k: 9\n", "YAML");
+  named("\x0a\0\0\0\x06\0\0\0"s + std::string(100, '\7'), "binary file");  // ORBvoc.bin
+}
+
+TEST_CASE("ORB-SLAM's vocabulary is named for what it is") {
+  const auto cases = shared_cases("vocabulary");
+  if (!cases) return;
+  CHECK_THROWS_WITH(load_vocabulary(*cases / "ORBvoc_like.txt"),
+                    Catch::Contains("a vocabulary of ORB's descriptors"));
 }
 
 TEST_CASE("A binary vocabulary that is cut off or longer is refused") {
@@ -223,7 +246,8 @@ TEST_CASE("A text that is no vocabulary is refused with the line where it is not
   CHECK(complaint(text_of(good, {leaf[0], node(0, 1, "0.5", 129)})) ==
         "3: a descriptor of more than 128 numbers");
   CHECK(complaint(text_of(good, {node(0, 1, "0.5", 32) + std::string(300, ' '), leaf[0]})) ==
-        "2: the line ends early");  // ORB's length
+        " is a vocabulary of ORB's descriptors of 32 bytes: one of SIFT's, of 128 numbers, is "
+        "needed");
   CHECK(complaint(text_of(good, {leaf[0], node(0, 1, "nan")})) == "3: the weight is not finite");
   CHECK(complaint(text_of(good, {leaf[0], node(0, 1, "-1")})) == "3: the weight is negative");
   CHECK(complaint(text_of(good, {leaf[0], node(0, 1, "1e999")})) == "3: the weight is no number");

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+
+#include "cameras/geometry/rigid3d.h"
+#include "frontend/input/rectification.h"
+
+namespace hybrid_slam {
+
+struct EurocCamera {
+  RawCamera camera;
+  Rigid3d body_from_cam;
+  std::string source;  // the file that says it
+};
+
+// Left and right of a sequence: cam{0,1}/sensor.yaml in the folder `mav` or, where there are none,
+// the first two cameras of a Kalibr camchain (camchain*.yaml in dso/, as TUM-VI has it, or in the
+// sequence's folder or mav). Throws InputError.
+std::array<EurocCamera, 2> read_euroc_cameras(const std::filesystem::path& folder,
+                                              const std::filesystem::path& mav);
+
+}  // namespace hybrid_slam
