@@ -98,8 +98,7 @@ std::string folder_name(const std::filesystem::path& path);
 std::unique_ptr<ImageSequence> open_kitti(const std::filesystem::path& path,
                                           const std::string& name, const InputOptions& options);
 std::unique_ptr<ImageSequence> open_kitti_raw(const std::filesystem::path& path,
-                                              const std::string& name,
-                                              const InputOptions& options);
+                                              const std::string& name, const InputOptions& options);
 std::unique_ptr<ImageSequence> open_euroc(const std::filesystem::path& path,
                                           const std::string& name, const InputOptions& options);
 std::unique_ptr<ImageSequence> open_uwslam(const std::filesystem::path& path,
