@@ -18,8 +18,8 @@ struct RelocalizationOptions {
   int max_keyframes = 20;  // the most similar ones, where nothing else is known
   double ratio = 0.75;     // best against second best descriptor
   double max_descriptor_distance = 0.7;
-  int min_matches = 15;  // no effect, as min_inliers: see is_believed()
-  int min_inliers = 50;
+  int min_matches = 15;      // no effect: see is_believed()
+  int min_inliers = 50;      // of a stereo pair, in the local map; no effect of a fisheye
   double wide_radius = 10;   // [px]
   double narrow_radius = 3;  // [px]
   PnpRansacOptions ransac{.min_inliers = 6};

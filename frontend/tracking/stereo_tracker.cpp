@@ -17,6 +17,8 @@ namespace {
 // one of the two is wrong: chi2 of 6 degrees of freedom, one frame in a million.
 constexpr double kMaxDisagreement = 38.3;
 
+constexpr double kMaxGap = 1;  // [s] since the last good frame, that is bridged
+
 // Share of what the odometer finds again of the last frame, below which the map shows little.
 constexpr double kFewLandmarks = 0.25;
 
@@ -102,7 +104,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
   result.time = frame.time;
   result.disparity_offset = frame.u_right_correction;
   result.shading = matcher_.shading();
-  if (last_.known()) track_onwards(frame, map, result);
+  if (last_.known() && follows_last(frame)) track_onwards(frame, map, result);
   if (!result.tracked()) relocalize(frame, map, result);
   if (!result.tracked() && last_.known()) coast(frame, map, result);
   const bool lost = !result.tracked() && !result.coasted();
@@ -120,6 +122,12 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
     }
   }
   return remember(map, std::move(frame), std::move(result));
+}
+
+// Long after the last good frame the vehicle may be anywhere, and the few points at the edge of
+// both views say little of where: then places are recognised instead.
+bool StereoTracker::follows_last(const Frame& frame) const {
+  return last_.tracked() || frame.time - last_.frame().time <= kMaxGap;
 }
 
 // From the last tracked frame on: by the map where that holds, else by the motion since.
@@ -184,7 +192,9 @@ void StereoTracker::relocalize(Frame& frame, const MapSnapshot& map, TrackedFram
   }
   if (!matcher_.relocalize(map, nearby, frame)) return;
   auto match = track_local_map(frame, map);
-  if (!match) return;
+  // Where the map looks like itself in several places, what is no accident may still be the wrong
+  // one. Without much evidence another component is begun, which loops can join later.
+  if (!match || match->support.inliers < options_.relocalization.min_inliers) return;
   result.source = PoseSource::kRelocalization;
   result.prediction = Prediction::kNone;
   result.reference = match->reference;

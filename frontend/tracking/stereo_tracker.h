@@ -70,6 +70,7 @@ class StereoTracker {
   void correct_disparities(Frame& frame) const;
   std::optional<LadderStep> predict(Frame& frame, TrackedFrame& result);
   std::optional<LadderStep> across_gap(const Frame& frame) const;
+  bool follows_last(const Frame& frame) const;
   void track_onwards(Frame& frame, const MapSnapshot& map, TrackedFrame& result);
   bool is_contradicted(const LadderStep& step, const Rigid3d& predicted, const Frame& frame,
                        const MapMatcher::LocalMapMatch& match) const;

@@ -65,7 +65,7 @@ TEST_CASE("Lost in unknown ground, the map goes on in another component", "[inte
     CHECK(result.frames.other_components == 15 - late);
     CHECK(result.records[20 + kDark + static_cast<std::size_t>(late)].frame.source ==
           PoseSource::kInitialization);
-    CHECK(worst_error(result, source) < 0.05);
+    CHECK(worst_error(result, source) < 0.1);  // an open track of 6 m
     CHECK(faults_of(*result.map) == "");
     // It is still two when it is read from a file.
     CHECK(component_sizes(copy_of(*result.map).view()) == component_sizes(*result.map));

@@ -219,8 +219,7 @@ TEST_CASE("what a test of outliers leaves of the information", "[pose]") {
     int kept = 0;
     for (int i = 0; i < 200000; ++i) {
       const Eigen::Vector3d noise = random.gaussian3(1);
-      const double s =
-          noise.head<2>().squaredNorm() + (dimension == 3 ? noise.z() * noise.z() : 0);
+      const double s = noise.head<2>().squaredNorm() + (dimension == 3 ? noise.z() * noise.z() : 0);
       if (s > chi2) continue;
       sum += s;
       ++kept;
