@@ -32,8 +32,8 @@ std::optional<FisheyeLens> read_kalibr_lens(const YamlSection& section);
 // equidistant, which `notes` says. Throws InputError if there is none, or two of a kind.
 FisheyeLens read_chain_fisheye(const YamlSection& chain, std::vector<std::string>& notes);
 
-// Basalt's JSON: value0.intrinsics with camera_type kb4, ds or eucm, value0.resolution. Throws
-// InputError unless exactly one camera is a fisheye.
+// The fisheye of Basalt's JSON, see basalt_file.h: camera_type kb4, ds or eucm. Throws InputError
+// unless exactly one camera is one.
 FisheyeLens read_basalt_lens(const YamlSection& file);
 
 }  // namespace hybrid_slam

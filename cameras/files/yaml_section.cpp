@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "cameras/files/printable.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -49,7 +51,7 @@ YamlSection YamlSection::read(const std::string& path) {
 void YamlSection::fail(const std::string& key, const std::string& reason) const {
   const YAML::Node node = node_[key];
   const std::string place = node ? ":" + line_of(node.Mark()) : "";
-  throw InputError(file_ + place + ": " + prefix_ + key + ": " + reason);
+  throw InputError(file_ + place + ": " + printable(prefix_ + key + ": " + reason));
 }
 
 std::vector<std::string> YamlSection::keys() const {
