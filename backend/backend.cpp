@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "backend/map/components.h"
+#include "backend/map/disparity_shift.h"
 #include "backend/map/dropped_features.h"
 #include "backend/problem/loop_correction.h"
 #include "backend/problem/solve_bundle.h"
@@ -101,6 +102,24 @@ void Backend::drop_features(const std::vector<KeyframeId>& keyframes) {
       if (loop.keyframe == id) renumber(loop.new_observations, kept);
     }
   }
+}
+
+void Backend::shift_disparities(CameraId camera, double by) {
+  BundleResult as_it_was;
+  for (const KeyframeId id : view().keyframe_ids()) {
+    as_it_was.cam_from_world.emplace_back(id, view().at(id).cam_from_world);
+  }
+  move(as_it_was);  // a state of its own, so that results of the one before are recognised
+  forget_moves(moves_.size());
+  const double scale = hybrid_slam::shift_disparities(map_, camera, by);
+  const auto resized = [&](const Sim3d& a_from_b) {
+    return Sim3d(a_from_b.rotation(), scale * a_from_b.translation(), a_from_b.scale());
+  };
+  for (PoseConstraint& loop : closed_) loop.a_from_b = resized(loop.a_from_b);
+  for (LoopMeasurement& loop : refused_) {
+    loop.keyframe_from_match = resized(loop.keyframe_from_match);
+  }
+  smoother_.reset();
 }
 
 BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {

@@ -2,9 +2,11 @@
 
 #include <cstdint>
 
-#include "backend/incremental/front.h"
+#include "cameras/geometry/rigid3d.h"
 
 namespace hybrid_slam {
+
+class Front;
 
 // An edge between two poses, linearised; delta_a and delta_b sum up their increments:
 //   r = residual + by_a * delta_a + by_b * delta_b.
@@ -14,18 +16,7 @@ struct EdgeTerm {
   Matrix6d by_pose[2] = {Matrix6d::Zero(), Matrix6d::Zero()};
   Vector6d residual = Vector6d::Zero();
 
-  void assemble(Front& front) const {
-    for (std::size_t i = 0; i < variable; ++i) {
-      const std::uint32_t slot = front.slot(poses[i]);
-      const Matrix6d own = by_pose[i].transpose() * by_pose[i];
-      front.add(slot, slot, own);
-      front.add_scale(slot, own.diagonal());
-      front.add_gradient(slot, by_pose[i].transpose() * residual);
-    }
-    if (variable == 2) {
-      front.add(front.slot(poses[0]), front.slot(poses[1]), by_pose[0].transpose() * by_pose[1]);
-    }
-  }
+  void assemble(Front& front) const;
 };
 
 }  // namespace hybrid_slam

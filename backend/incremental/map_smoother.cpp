@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "backend/incremental/incremental_solver.h"
 #include "backend/map/dropped_features.h"
 #include "backend/problem/odometry_constraints.h"
 
@@ -59,7 +60,9 @@ std::string MapSmootherOptions::validate() const {
 }
 
 MapSmoother::MapSmoother(const MapSmootherOptions& options)
-    : options_(options), solver_(options.solver) {}
+    : options_(options), solver_(std::make_unique<IncrementalSolver>(options.solver)) {}
+
+MapSmoother::~MapSmoother() = default;
 
 BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
                                  const std::stop_token& stop) {
@@ -71,7 +74,7 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
       known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
   for (const LandmarkId id : changed) take_in_landmark(*map, id);
   take_in_odometry(*map);
-  const UpdateSummary updated = solver_.update(stop);
+  const UpdateSummary updated = solver_->update(stop);
 
   forget_marginalized(*map, updated.marginalized);
   BundleResult result;
@@ -96,7 +99,7 @@ std::shared_ptr<const KeyframeCovariances> MapSmoother::covariances(const MapSna
       poses.push_back(pose_of_[id.value]);
     }
   }
-  IncrementalSolver::PosePaths found = solver_.paths(poses, kMaxCovarianceNumbers);
+  IncrementalSolver::PosePaths found = solver_->paths(poses, kMaxCovarianceNumbers);
   std::vector<KeyframeCovariances::Known> known;
   for (const auto& pose : found.poses) {  // keyframes and poses are numbered in the same order
     known.push_back({keyframe_of_[pose.pose], pose.at, pose.by_variable});
@@ -129,9 +132,9 @@ void MapSmoother::follow_moves(const MapSnapshot& map) {
     const Keyframe* keyframe = map.find(id);
     if (keyframe == nullptr || id.value >= pose_of_.size() || id == map.origin()) continue;
     const std::uint32_t pose = pose_of_[id.value];
-    if (is_off(*keyframe, solver_.pose(pose))) moved.emplace_back(pose, keyframe->cam_from_world);
+    if (is_off(*keyframe, solver_->pose(pose))) moved.emplace_back(pose, keyframe->cam_from_world);
   }
-  if (!moved.empty()) solver_.move_poses(moved);
+  if (!moved.empty()) solver_->move_poses(moved);
 }
 
 bool MapSmoother::is_off(const Keyframe& keyframe, const Rigid3d& estimate) const {
@@ -142,14 +145,14 @@ bool MapSmoother::is_off(const Keyframe& keyframe, const Rigid3d& estimate) cons
 // All up to this one, in their order.
 void MapSmoother::take_in_keyframes(const MapSnapshot& map, KeyframeId last) {
   while (camera_count_ < map.camera_count()) {
-    solver_.add_camera(map.camera(CameraId(static_cast<std::uint32_t>(camera_count_++))));
+    solver_->add_camera(map.camera(CameraId(static_cast<std::uint32_t>(camera_count_++))));
   }
   while (pose_of_.size() <= last.value) {
     const KeyframeId id(static_cast<std::uint32_t>(pose_of_.size()));
     const Keyframe* keyframe = map.find(id);
     pose_of_.push_back(kNone);
     if (keyframe == nullptr) continue;
-    pose_of_.back() = solver_.add_pose(
+    pose_of_.back() = solver_->add_pose(
         {keyframe->cam_from_world, keyframe->observations->camera.value, id == map.origin()});
     keyframe_of_.push_back(id);
   }
@@ -159,8 +162,8 @@ void MapSmoother::take_in_loops(const MapSnapshot& map) {
   for (const PoseConstraint& loop : new_loops_) {
     if (map.find(loop.a) == nullptr || map.find(loop.b) == nullptr) continue;
     take_in_keyframes(map, std::max(loop.a, loop.b));
-    solver_.add_edge({pose_of_[loop.a.value], pose_of_[loop.b.value], without_scale(loop.a_from_b),
-                      loop.information.topLeftCorner<6, 6>(), true});
+    solver_->add_edge({pose_of_[loop.a.value], pose_of_[loop.b.value], without_scale(loop.a_from_b),
+                       loop.information.topLeftCorner<6, 6>(), true});
   }
   new_loops_.clear();
 }
@@ -193,14 +196,14 @@ void MapSmoother::take_in_odometry(const MapSnapshot& map, KeyframeId id) {
   if (same && std::abs(share - known.share) <= kShareTolerance) return;
   known.share = share;
   if (known.marginalized) return;  // it is in the prior, and must not count twice
-  if (known.edge != kNone) solver_.remove_edge(std::exchange(known.edge, kNone));
+  if (known.edge != kNone) solver_->remove_edge(std::exchange(known.edge, kNone));
   const auto constraint =
       odometry != nullptr ? odometry_constraint(*keyframe, share) : std::nullopt;
   if (!constraint) return;
   take_in_keyframes(map, id);
-  known.edge = solver_.add_edge({pose_of_[id.value], pose_of_[odometry->previous.value],
-                                 without_scale(constraint->a_from_b),
-                                 constraint->information.topLeftCorner<6, 6>(), false});
+  known.edge = solver_->add_edge({pose_of_[id.value], pose_of_[odometry->previous.value],
+                                  without_scale(constraint->a_from_b),
+                                  constraint->information.topLeftCorner<6, 6>(), false});
 }
 
 // Brings what the solver has of a landmark in line with the map.
@@ -209,17 +212,17 @@ void MapSmoother::take_in_landmark(const MapSnapshot& map, LandmarkId id) {
   if (landmark == nullptr) {
     const auto gone = landmarks_.find(id);
     if (gone == landmarks_.end()) return;
-    solver_.remove_point(gone->second.point);
+    solver_->remove_point(gone->second.point);
     landmarks_.erase(gone);
     return;
   }
   const auto [place, is_new] = landmarks_.try_emplace(id);
   KnownLandmark& known = place->second;
-  if (is_new) known.point = solver_.add_point(landmark->point_in_world);
+  if (is_new) known.point = solver_->add_point(landmark->point_in_world);
   const std::vector<Observation>& wanted = landmark->observations;
   std::erase_if(known.views, [&](const View& view) {
     if (std::binary_search(wanted.begin(), wanted.end(), view.seen)) return false;
-    if (view.in_solver != kNone) solver_.remove_observation(view.in_solver);
+    if (view.in_solver != kNone) solver_->remove_observation(view.in_solver);
     return true;
   });
   for (const Observation& seen : wanted) {
@@ -237,7 +240,7 @@ std::uint32_t MapSmoother::add_observation(const MapSnapshot& map, std::uint32_t
   const Keypoint& keypoint = frame.features.keypoints[seen.keypoint];
   const double u_right =
       frame.has_right(seen.keypoint) ? frame.u_right[seen.keypoint] : kNoRightMatch;
-  return solver_.add_observation(
+  return solver_->add_observation(
       {pose_of_[seen.keyframe.value], point, {keypoint.x, keypoint.y, u_right}, keypoint.sigma});
 }
 
@@ -250,10 +253,10 @@ void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
     std::erase_if(found->second.views, [&](const View& view) {
       if (view.in_solver == kNone) return false;
       const bool stereo = map.at(view.seen.keyframe).observations->has_right(view.seen.keypoint);
-      if (solver_.chi2(view.in_solver) <= (stereo ? options.chi2_stereo : options.chi2_mono)) {
+      if (solver_->chi2(view.in_solver) <= (stereo ? options.chi2_stereo : options.chi2_mono)) {
         return false;
       }
-      solver_.remove_observation(view.in_solver);
+      solver_->remove_observation(view.in_solver);
       result.outliers.push_back({id, view.seen});
       return true;  // forgotten: where the map takes it in again, it is a new one
     });
@@ -267,7 +270,7 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
   for (const std::uint32_t pose : moved) {
     const Keyframe* keyframe = map.find(keyframe_of_[pose]);
     if (keyframe == nullptr) continue;
-    const Rigid3d estimate = solver_.pose(pose);
+    const Rigid3d estimate = solver_->pose(pose);
     if (!is_off(*keyframe, estimate)) continue;
     result.cam_from_world.emplace_back(keyframe->id, estimate);
     seen.insert(seen.end(), keyframe->landmarks.begin(), keyframe->landmarks.end());
@@ -277,8 +280,8 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
   for (const LandmarkId id : seen) {
     const auto found = landmarks_.find(id);
     if (found == landmarks_.end()) continue;
-    solver_.place(found->second.point);
-    const Eigen::Vector3d estimate = solver_.point(found->second.point);
+    solver_->place(found->second.point);
+    const Eigen::Vector3d estimate = solver_->point(found->second.point);
     if (estimate.allFinite()) result.point_in_world.emplace_back(id, estimate);
   }
 }

@@ -3,13 +3,17 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <unordered_map>
 #include <vector>
 
-#include "backend/incremental/incremental_solver.h"
+#include "backend/incremental/incremental_options.h"
 #include "backend/map/map_snapshot.h"
+#include "backend/problem/problem_config.h"
 
 namespace hybrid_slam {
+
+class IncrementalSolver;
 
 struct MapSmootherOptions {
   IncrementalOptions solver;
@@ -31,6 +35,7 @@ struct MapSmootherOptions {
 class MapSmoother {
  public:
   explicit MapSmoother(const MapSmootherOptions& options);
+  ~MapSmoother();
 
   // A motion measured between two keyframes, with its weight and without scale: an edge of the
   // problem from the next update on, whose map must have both. With a window it holds the present
@@ -53,7 +58,7 @@ class MapSmoother {
   // bounded cost. Those that a window has marginalised are not known.
   std::shared_ptr<const KeyframeCovariances> covariances(const MapSnapshot& map) const;
 
-  const IncrementalSolver& solver() const { return solver_; }
+  const IncrementalSolver& solver() const { return *solver_; }
 
  private:
   static constexpr std::uint32_t kNone = static_cast<std::uint32_t>(-1);
@@ -93,7 +98,7 @@ class MapSmoother {
   void forget_marginalized(const MapSnapshot& map, const std::vector<std::uint32_t>& poses);
 
   MapSmootherOptions options_;
-  IncrementalSolver solver_;
+  std::unique_ptr<IncrementalSolver> solver_;
   std::shared_ptr<const MapSnapshot> known_map_;  // as of the last update
   std::size_t camera_count_ = 0;
   std::vector<std::uint32_t> pose_of_;   // by keyframe

@@ -29,9 +29,7 @@ struct WorldTangent {
     return at_place;
   }
 
-  Rigid3d moved(const Rigid3d& cam_from_world, const Vector6d& increment) const {
-    return cam_from_world * se3_exp(at_origin(increment));
-  }
+  Rigid3d moved(const Rigid3d& cam_from_world, const Vector6d& increment) const;
 
   // Turns derivatives by xi into those by the increment, and back.
   template <typename Derived>

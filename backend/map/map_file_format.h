@@ -21,9 +21,11 @@ inline constexpr std::string_view kSectionOrder[] = {
     kInfoSection,     kCamerasSection, kStateSection,    kKeyframesSection,
     kOdometrySection, kErasedSection,  kLandmarksSection};
 
-// The one door to the tables for what stores a map and makes one from stored tables.
+// The one door to the tables for what stores a map, makes one from stored tables, or changes what
+// was measured.
 struct MapFileAccess {
   static const MapTables& tables(const MapSnapshot& map) { return map.tables_; }
+  static MapTables& tables(Map& map) { return map.view_.tables_; }
   static Map make(MapTables tables) {
     Map map;
     map.view_.tables_ = std::move(tables);
