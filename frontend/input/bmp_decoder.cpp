@@ -45,6 +45,11 @@ std::string decode_bmp(Bytes file, GrayChannel channel, const MakeRoom& make_roo
   }
   const bool from_top = height < 0;
   const std::int64_t rows = from_top ? -std::int64_t{height} : std::int64_t{height};
+  const std::uint64_t row_bytes =
+      width > 0 ? std::uint64_t{bits} / 8 * static_cast<unsigned>(width) : 0;
+  if (row_bytes > 0 && static_cast<std::uint64_t>(rows) > file.size() / row_bytes) {
+    return "truncated BMP";
+  }
   make_room(width < 0 ? 0 : static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows),
             image.gray);
   std::array<std::uint8_t, 256> palette{};

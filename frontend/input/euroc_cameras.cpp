@@ -1,7 +1,9 @@
 #include "frontend/input/euroc_cameras.h"
 
 #include <algorithm>
+#include <span>
 
+#include "cameras/calibration/basalt_file.h"
 #include "cameras/calibration/calibration_file.h"
 #include "cameras/files/yaml_section.h"
 #include "frontend/input/file_sequence.h"
@@ -43,7 +45,42 @@ void read_distortion(const YamlSection& file, RawCamera& camera) {
   }
 }
 
-EurocCamera read_sensor(const fs::path& path) {
+// The first by name; empty if there is none.
+fs::path find_camchain(const fs::path& folder, const fs::path& mav) {
+  for (const fs::path& place : {folder / "dso", folder, mav}) {
+    if (!fs::is_directory(place)) continue;
+    std::vector<fs::path> found;
+    for (const fs::directory_entry& entry : fs::directory_iterator(place)) {
+      const std::string name = entry.path().filename().string();
+      if (name.starts_with("camchain") && name.ends_with(".yaml")) found.push_back(entry.path());
+    }
+    if (!found.empty()) return *std::min_element(found.begin(), found.end());
+  }
+  return {};
+}
+
+// `distortion`: of a Pinhole.
+RawCamera raw_camera(const Camera& camera, std::span<const double> distortion) {
+  RawCamera raw;
+  raw.size = {image_width(camera), image_height(camera)};
+  const auto take = [&](const auto& params) {
+    raw.fx = params[0], raw.fy = params[1], raw.cx = params[2], raw.cy = params[3];
+  };
+  if (const auto* fisheye = std::get_if<Calibrated<KannalaBrandt>>(&camera)) {
+    take(fisheye->params);
+    raw.is_fisheye = true;
+    raw.distortion.assign(fisheye->params.begin() + 4, fisheye->params.end());
+  } else {
+    take(std::get<Calibrated<Pinhole>>(camera).params);
+    raw.distortion.assign(distortion.begin(), distortion.end());
+    if (raw.distortion.empty()) raw.distortion.assign(4, 0.0);
+  }
+  return raw;
+}
+
+}  // namespace
+
+EurocCamera read_euroc_sensor(const fs::path& path) {
   const YamlSection file = YamlSection::read(path.string());
   if (file.text("camera_model") != "pinhole")
     file.fail("camera_model", "only pinhole is supported");
@@ -69,39 +106,7 @@ EurocCamera read_sensor(const fs::path& path) {
   return result;
 }
 
-// The first by name; empty if there is none.
-fs::path find_camchain(const fs::path& folder, const fs::path& mav) {
-  for (const fs::path& place : {folder / "dso", folder, mav}) {
-    if (!fs::is_directory(place)) continue;
-    std::vector<fs::path> found;
-    for (const fs::directory_entry& entry : fs::directory_iterator(place)) {
-      const std::string name = entry.path().filename().string();
-      if (name.starts_with("camchain") && name.ends_with(".yaml")) found.push_back(entry.path());
-    }
-    if (!found.empty()) return *std::min_element(found.begin(), found.end());
-  }
-  return {};
-}
-
-RawCamera raw_camera(const KalibrCamera& kalibr) {
-  RawCamera raw;
-  raw.size = {image_width(kalibr.camera), image_height(kalibr.camera)};
-  const auto take = [&](const auto& params) {
-    raw.fx = params[0], raw.fy = params[1], raw.cx = params[2], raw.cy = params[3];
-  };
-  if (const auto* fisheye = std::get_if<Calibrated<KannalaBrandt>>(&kalibr.camera)) {
-    take(fisheye->params);
-    raw.is_fisheye = true;
-    raw.distortion.assign(fisheye->params.begin() + 4, fisheye->params.end());
-  } else {
-    take(std::get<Calibrated<Pinhole>>(kalibr.camera).params);
-    raw.distortion.assign(kalibr.radtan.begin(), kalibr.radtan.end());
-  }
-  return raw;
-}
-
-// The body is the chain's IMU or, without one, the left camera.
-std::array<EurocCamera, 2> read_camchain(const fs::path& path) {
+std::array<EurocCamera, 2> read_camchain_pair(const fs::path& path) {
   const std::vector<KalibrCamera> chain = read_kalibr_camchain(path.string());
   if (chain.size() < 2) throw InputError(path.string() + ": cam1: is missing");
   if (!chain[1].camera_from_previous) {
@@ -109,7 +114,7 @@ std::array<EurocCamera, 2> read_camchain(const fs::path& path) {
   }
   std::array<EurocCamera, 2> cameras;
   for (std::size_t i = 0; i < 2; ++i) {
-    cameras[i].camera = raw_camera(chain[i]);
+    cameras[i].camera = raw_camera(chain[i].camera, chain[i].radtan);
     cameras[i].source = path.string();
   }
   if (chain[0].camera_from_imu) cameras[0].body_from_cam = inverse(*chain[0].camera_from_imu);
@@ -117,15 +122,25 @@ std::array<EurocCamera, 2> read_camchain(const fs::path& path) {
   return cameras;
 }
 
-}  // namespace
+std::array<EurocCamera, 2> read_basalt_pair(const fs::path& path) {
+  const std::vector<BasaltCamera> all = read_basalt_cameras(path.string());
+  if (all.size() < 2)
+    throw InputError(path.string() + ": value0: has one camera, and a pair has two");
+  std::array<EurocCamera, 2> cameras;
+  for (std::size_t i = 0; i < 2; ++i) {
+    cameras[i] = {raw_camera(all[i].camera, all[i].distortion), all[i].imu_from_camera,
+                  path.string()};
+  }
+  return cameras;
+}
 
 std::array<EurocCamera, 2> read_euroc_cameras(const fs::path& folder, const fs::path& mav) {
   const fs::path left = mav / "cam0" / "sensor.yaml";
   if (!fs::exists(left)) {
     const fs::path chain = find_camchain(folder, mav);
-    if (!chain.empty()) return read_camchain(chain);
+    if (!chain.empty()) return read_camchain_pair(chain);
   }
-  return {read_sensor(left), read_sensor(mav / "cam1" / "sensor.yaml")};
+  return {read_euroc_sensor(left), read_euroc_sensor(mav / "cam1" / "sensor.yaml")};
 }
 
 }  // namespace hybrid_slam

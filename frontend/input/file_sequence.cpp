@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
 #include "frontend/input/median.h"
 #include "frontend/input/text_file.h"
@@ -15,150 +14,44 @@ namespace fs = std::filesystem;
 
 namespace {
 
-GrayImage read_or_throw(const fs::path& path, ImageSize size, const ImageReading& reading,
-                        const std::string& frame, const char* side) {
-  if (path.empty()) throw InputError(frame + ": no " + side + " image");
-  return read_gray_image(path, size, reading);
-}
-
-// Up to `count` frames, evenly from all over the sequence.
-std::vector<std::size_t> sample_frames(std::size_t size, std::size_t count) {
-  std::vector<std::size_t> frames;
-  for (std::size_t i = 0; i < std::min(size, count); ++i) {
-    frames.push_back(i * size / std::min(size, count));
+class FileStore final : public ImageStore {
+ public:
+  explicit FileStore(std::shared_ptr<const std::vector<FramePaths>> files)
+      : files_(std::move(files)) {}
+  std::size_t size() const override { return files_->size(); }
+  bool has(std::size_t frame, SequenceCamera camera) const override {
+    return !path_of(frame, camera).empty();
   }
-  return frames;
-}
-
-// The highest sample of the images that can be read; 0 where they have 8 bits.
-int highest_sample(const std::vector<FramePaths>& files) {
-  constexpr std::size_t kFrames = 8;
-  int highest = 0;
-  for (const std::size_t frame : sample_frames(files.size(), kFrames)) {
-    const FramePaths& paths = files[frame];
-    for (const fs::path* const path : {&paths.left, &paths.right, &paths.fisheye}) {
-      try {
-        if (!path->empty()) highest = std::max(highest, highest_wide_sample(*path));
-      } catch (const InputError&) {  // counted when the frame is read
-      }
-    }
-    if (highest == 0 && !paths.left.empty()) return 0;
+  DecodedImage decode(std::size_t frame, SequenceCamera camera, std::optional<ImageSize> expected,
+                      GrayChannel channel) const override {
+    return decode_image_file(path_of(frame, camera), expected, channel);
   }
-  return highest;
-}
 
-// Mean brightness of a few left images that can be read; none if there are none.
-std::optional<double> mean_brightness(const std::vector<FramePaths>& files,
-                                      const ImageReading& reading) {
-  constexpr std::size_t kFrames = 3;
-  double sum = 0;
-  double count = 0;
-  for (const std::size_t frame : sample_frames(files.size(), kFrames)) {
-    try {
-      if (files[frame].left.empty()) continue;
-      const GrayImage image = read_gray_image(files[frame].left, reading);
-      sum = std::accumulate(image.pixels.begin(), image.pixels.end(), sum);
-      count += static_cast<double>(image.pixels.size());
-    } catch (const InputError&) {  // counted when the frame is read
-    }
+ private:
+  const fs::path& path_of(std::size_t frame, SequenceCamera camera) const {
+    const FramePaths& paths = files_->at(frame);
+    return camera == SequenceCamera::kLeft    ? paths.left
+           : camera == SequenceCamera::kRight ? paths.right
+                                              : paths.fisheye;
   }
-  return count > 0 ? std::optional(sum / count) : std::nullopt;
-}
+
+  std::shared_ptr<const std::vector<FramePaths>> files_;
+};
 
 }  // namespace
 
 FileSequence::FileSequence(SequenceInfo info, std::vector<FramePaths> files,
                            const InputOptions& options,
                            std::unique_ptr<const StereoRectifier> rectifier)
-    : info_(std::move(info)),
-      files_(std::move(files)),
-      options_(options),
-      rectifier_(std::move(rectifier)) {
-  if (files_.size() != info_.times.size()) throw std::logic_error("one time per frame");
-  if (options_.images.white == 0) find_white();
-  warn_of_darkness();
-  warn_of_units();
-}
+    : FileSequence(std::move(info),
+                   std::make_shared<const std::vector<FramePaths>>(std::move(files)), options,
+                   std::move(rectifier)) {}
 
-// 16 bits are what they say; fewer are found by what the images hold.
-void FileSequence::find_white() {
-  constexpr int kAllBits = 65535;
-  const int highest = highest_sample(files_);
-  if (highest == 0) return;
-  options_.images.white = white_above(highest);
-  if (options_.images.white == kAllBits) return;
-  info_.warnings.push_back(info_.name + ": the images have more than 8 bits, with samples up to " +
-                           std::to_string(highest) + "; " + std::to_string(options_.images.white) +
-                           " is taken for white (--white-level settles it)");
-}
-
-// A stereo rig is some centimetres to a few metres wide, and its images come every few seconds at
-// most: what is far beyond was written in other units.
-void FileSequence::warn_of_units() {
-  constexpr double kWidest = 5;         // [m]
-  constexpr double kNarrowest = 0.002;  // [m]
-  constexpr double kSlowest = 1000;     // [s] between frames
-  constexpr double kFastest = 1e-5;     // [s]
-  const auto warn = [&](const char* what, double value, const char* question) {
-    char text[160];
-    std::snprintf(text, sizeof(text), "%s %.6g %s", what, value, question);
-    info_.warnings.push_back(info_.name + ": " + text);
-  };
-  const double baseline = info_.stereo.params[4];
-  if (baseline > kWidest) {
-    warn("the baseline is", baseline, "m: is the calibration in millimetres?");
-  } else if (baseline < kNarrowest) {
-    warn("the baseline is", baseline, "m: is the calibration in another unit?");
-  }
-  if (info_.times.size() < 2) return;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < info_.times.size(); ++i) {
-    steps.push_back(info_.times[i] - info_.times[i - 1]);
-  }
-  const double step = median(std::move(steps));
-  if (step > kSlowest) {
-    warn("frames are", step, "s apart: are the times in milli- or nanoseconds?");
-  } else if (step < kFastest) {
-    warn("frames are", step, "s apart: are the times in seconds?");
-  }
-}
-
-void FileSequence::warn_of_darkness() {
-  constexpr double kDark = 8;  // of 255: noise and rounding are a good part of so small a contrast
-  const auto mean = mean_brightness(files_, options_.images);
-  if (!mean || *mean >= kDark) return;
-  char text[16];
-  std::snprintf(text, sizeof(text), "%.1f", *mean);
-  info_.warnings.push_back(
-      info_.name + ": the left images are " +
-      (*mean == 0 ? "black"
-                  : "dark: mean brightness " + std::string(text) + " of 255 in those looked at"));
-}
-
-FrameImages FileSequence::read(std::size_t frame) const {
-  const FramePaths& paths = files_.at(frame);
-  const ImageSize size{info_.stereo.width, info_.stereo.height};
-  const std::string name = info_.name + ": frame " + std::to_string(frame);
-  FrameImages images;
-  images.frame_index = static_cast<std::int64_t>(frame);
-  images.time = info_.times[frame];
-  images.left = read_or_throw(paths.left, size, options_.images, name, "left");
-  images.right = read_or_throw(paths.right, rectifier_ ? rectifier_->right_size() : size,
-                               options_.images, name, "right");
-  if (rectifier_) {
-    rectifier_->rectify_left(images.left);
-    rectifier_->rectify_right(images.right);
-  }
-  if (info_.fisheye) {
-    try {
-      images.fisheye = read_or_throw(paths.fisheye, {info_.fisheye->width, info_.fisheye->height},
-                                     options_.images, name, "fisheye");
-    } catch (const InputError& error) {
-      images.fisheye_error = error.what();
-    }
-  }
-  return images;
-}
+FileSequence::FileSequence(SequenceInfo info, SharedPaths files, const InputOptions& options,
+                           std::unique_ptr<const StereoRectifier> rectifier)
+    : StoredSequence(std::move(info), std::make_unique<const FileStore>(files), options,
+                     std::move(rectifier)),
+      files_(std::move(files)) {}
 
 NumberedImages list_numbered_images(const fs::path& folder, const std::string& suffix) {
   if (!fs::is_directory(folder)) throw InputError(folder.string() + ": no such folder");
@@ -240,6 +133,39 @@ void add_fisheye_images(const NumberedImages& images, int first, std::vector<Fra
     warnings.push_back(where + ": " + std::to_string(missing) + " of " +
                        std::to_string(files.size()) + " frames lack a fisheye image");
   }
+}
+
+// A stereo rig is some centimetres to a few metres wide, and its images come every few seconds at
+// most: what is far beyond was written in other units.
+std::vector<std::string> doubts_of_units(const SequenceInfo& info) {
+  constexpr double kWidest = 5;         // [m]
+  constexpr double kNarrowest = 0.002;  // [m]
+  constexpr double kSlowest = 1000;     // [s] between frames
+  constexpr double kFastest = 1e-5;     // [s]
+  std::vector<std::string> doubts;
+  const auto warn = [&](const char* what, double value, const char* question) {
+    char text[160];
+    std::snprintf(text, sizeof(text), "%s %.6g %s", what, value, question);
+    doubts.push_back(info.name + ": " + text);
+  };
+  const double baseline = info.stereo.params[4];
+  if (baseline > kWidest) {
+    warn("the baseline is", baseline, "m: is the calibration in millimetres?");
+  } else if (baseline < kNarrowest) {
+    warn("the baseline is", baseline, "m: is the calibration in another unit?");
+  }
+  if (info.times.size() < 2) return doubts;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < info.times.size(); ++i) {
+    steps.push_back(info.times[i] - info.times[i - 1]);
+  }
+  const double step = median(std::move(steps));
+  if (step > kSlowest) {
+    warn("frames are", step, "s apart: are the times in milli- or nanoseconds?");
+  } else if (step < kFastest) {
+    warn("frames are", step, "s apart: are the times in seconds?");
+  }
+  return doubts;
 }
 
 ImageSize first_image_size(const std::vector<FramePaths>& files) {

@@ -11,6 +11,7 @@
 #include "frontend/input/image_file.h"
 #include "frontend/input/image_sequence.h"
 #include "frontend/input/rectification.h"
+#include "frontend/input/stored_sequence.h"
 
 // What the readers of all layouts share.
 namespace hybrid_slam {
@@ -22,24 +23,20 @@ struct FramePaths {
   std::filesystem::path fisheye;
 };
 
-// A sequence whose images are files. Rectifies what it reads if given a rectifier. What is white in
-// images of more than 8 bits is found over the sequence unless `options` says it.
-class FileSequence : public ImageSequence {
+// A sequence whose images are files.
+class FileSequence final : public StoredSequence {
  public:
   FileSequence(SequenceInfo info, std::vector<FramePaths> files, const InputOptions& options,
                std::unique_ptr<const StereoRectifier> rectifier);
-  const SequenceInfo& info() const override { return info_; }
-  FrameImages read(std::size_t frame) const override;
+
+  const FramePaths& files(std::size_t frame) const { return files_->at(frame); }
 
  private:
-  void find_white();
-  void warn_of_darkness();
-  void warn_of_units();
+  using SharedPaths = std::shared_ptr<const std::vector<FramePaths>>;
+  FileSequence(SequenceInfo info, SharedPaths files, const InputOptions& options,
+               std::unique_ptr<const StereoRectifier> rectifier);
 
-  SequenceInfo info_;
-  std::vector<FramePaths> files_;
-  InputOptions options_;
-  std::unique_ptr<const StereoRectifier> rectifier_;  // null: the images are rectified
+  SharedPaths files_;
 };
 
 // Images of a folder by their number: files named <digits><suffix>.<png|jpg|...>. Throws
@@ -78,6 +75,10 @@ Calibrated<RectifiedStereo> make_stereo_camera(double fx, double fy, double cx, 
 // Adds the fisheye's images to frames that begin with number `first`; warns of those that lack one.
 void add_fisheye_images(const NumberedImages& images, int first, std::vector<FramePaths>& files,
                         const std::string& where, std::vector<std::string>& warnings);
+
+// What of baseline and times is so far beyond what rigs have that it seems written in other units;
+// one line each.
+std::vector<std::string> doubts_of_units(const SequenceInfo& info);
 
 // Throws InputError, starting with `source`, if the two sizes differ.
 void check_image_size(ImageSize image, ImageSize calibrated, const std::string& source);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,6 +45,14 @@ inline std::uint8_t gray_of(int red, int green, int blue, GrayChannel channel) {
   return static_cast<std::uint8_t>((9798 * red + 19235 * green + 3735 * blue) >> 15);
 }
 
+// Whether a file of this size may hold so many bytes of pixels: the best compression in use, that
+// of images of one colour, makes some 10,000 bytes of one. To be asked before there is room for
+// them.
+inline bool can_hold(std::size_t file_size, std::uint64_t bytes) {
+  constexpr std::uint64_t kMostOfOne = 1 << 14;
+  return bytes / kMostOfOne <= file_size;
+}
+
 // Decode a whole file into `image` as read_gray_image() says. Return what is wrong, in one line, or
 // nothing.
 using Decoder = std::string(std::span<const std::uint8_t> file, GrayChannel channel,
@@ -53,5 +62,23 @@ Decoder decode_jpeg;
 Decoder decode_tiff;
 Decoder decode_pnm;
 Decoder decode_bmp;
+
+// What every reader of images does with them; `name` begins its complaints.
+
+// Refuses impossible sizes, and another one than expected. Both arguments must outlive it.
+MakeRoom make_room_for(const std::optional<ImageSize>& expected, const std::string& name);
+
+// A whole image file that is in memory, told by its content. Throws InputError as
+// read_gray_image() does.
+DecodedImage decode_image(std::span<const std::uint8_t> file, const std::string& name,
+                          std::optional<ImageSize> expected, GrayChannel channel);
+DecodedImage decode_image_file(const std::filesystem::path& path, std::optional<ImageSize> expected,
+                               GrayChannel channel);
+
+// The highest sample of an image of more than 8 bits; 0 of others.
+int highest_sample(const DecodedImage& image);
+
+// 8 bits of however many; the channel has been chosen for 8 bits, and is for more.
+GrayImage to_gray(DecodedImage&& image, const ImageReading& reading);
 
 }  // namespace hybrid_slam

@@ -30,8 +30,8 @@ constexpr std::array<std::uint8_t, 4> kTiffSignature{'I', 'I', 42, 0};
 constexpr std::array<std::uint8_t, 4> kBigEndianTiffSignature{'M', 'M', 0, 42};
 constexpr std::array<std::uint8_t, 2> kBmpSignature{'B', 'M'};
 
-[[noreturn]] void fail(const fs::path& path, const std::string& reason) {
-  throw InputError(path.string() + ": " + reason);
+[[noreturn]] void fail(const std::string& name, const std::string& reason) {
+  throw InputError(name + ": " + reason);
 }
 
 std::vector<std::uint8_t> read_bytes(const fs::path& path) {
@@ -68,34 +68,6 @@ Decoder* decoder_of(Bytes bytes) {
   return is_pnm ? decode_pnm : nullptr;
 }
 
-DecodedImage decode(const fs::path& path, std::optional<ImageSize> expected, GrayChannel channel) {
-  const std::vector<std::uint8_t> bytes = read_bytes(path);
-  const auto make_room = [&](std::uint32_t width, std::uint32_t height, GrayImage& image) {
-    if (width == 0 || height == 0 || width > kMaxSide || height > kMaxSide ||
-        std::uint64_t{width} * height > kMaxPixels) {
-      fail(path, "impossible image size in its header");
-    }
-    const ImageSize size{static_cast<int>(width), static_cast<int>(height)};
-    if (expected && size != *expected) {
-      fail(path, "image is " + std::to_string(size.width) + "x" + std::to_string(size.height) +
-                     ", expected " + std::to_string(expected->width) + "x" +
-                     std::to_string(expected->height));
-    }
-    image = {size.width, size.height,
-             std::vector<std::uint8_t>(std::size_t{width} * std::size_t{height})};
-  };
-  DecodedImage image;
-  Decoder* const decoder = decoder_of(bytes);
-  const std::string wrong = decoder == nullptr ? "neither PNG nor JPEG, TIFF, PGM, PPM or BMP"
-                                               : decoder(bytes, channel, make_room, image);
-  if (!wrong.empty()) fail(path, wrong);
-  return image;
-}
-
-int highest_sample(const DecodedImage& image) {
-  return image.is_wide() ? *std::max_element(image.samples.begin(), image.samples.end()) : 0;
-}
-
 // Grey of a colour with 16 bits per sample, as libpng weighs and rounds it.
 std::uint32_t wide_gray_of(const std::uint16_t* rgb, GrayChannel channel) {
   switch (channel) {
@@ -111,9 +83,53 @@ std::uint32_t wide_gray_of(const std::uint16_t* rgb, GrayChannel channel) {
   return (9798U * rgb[0] + 19235U * rgb[1] + 3735U * rgb[2] + 16384U) >> 15;
 }
 
-GrayImage read(const fs::path& path, std::optional<ImageSize> expected,
-               const ImageReading& reading) {
-  DecodedImage image = decode(path, expected, reading.channel);
+}  // namespace
+
+MakeRoom make_room_for(const std::optional<ImageSize>& expected, const std::string& name) {
+  return [&](std::uint32_t width, std::uint32_t height, GrayImage& image) {
+    if (width == 0 || height == 0 || width > kMaxSide || height > kMaxSide ||
+        std::uint64_t{width} * height > kMaxPixels) {
+      fail(name, "impossible image size in its header");
+    }
+    const ImageSize size{static_cast<int>(width), static_cast<int>(height)};
+    if (expected && size != *expected) {
+      fail(name, "image is " + std::to_string(size.width) + "x" + std::to_string(size.height) +
+                     ", expected " + std::to_string(expected->width) + "x" +
+                     std::to_string(expected->height));
+    }
+    image = {size.width, size.height,
+             std::vector<std::uint8_t>(std::size_t{width} * std::size_t{height})};
+  };
+}
+
+DecodedImage decode_image(Bytes file, const std::string& name, std::optional<ImageSize> expected,
+                          GrayChannel channel) {
+  if (file.empty()) fail(name, "empty image");
+  DecodedImage image;
+  Decoder* const decoder = decoder_of(file);
+  const MakeRoom make_room = [&, make = make_room_for(expected, name)](
+                                 std::uint32_t width, std::uint32_t height, GrayImage& gray) {
+    if (!can_hold(file.size(), std::uint64_t{width} * height)) {
+      fail(name, "truncated: its header tells of more pixels than its bytes can hold");
+    }
+    make(width, height, gray);
+  };
+  const std::string wrong = decoder == nullptr ? "neither PNG nor JPEG, TIFF, PGM, PPM or BMP"
+                                               : decoder(file, channel, make_room, image);
+  if (!wrong.empty()) fail(name, wrong);
+  return image;
+}
+
+DecodedImage decode_image_file(const fs::path& path, std::optional<ImageSize> expected,
+                               GrayChannel channel) {
+  return decode_image(read_bytes(path), path.string(), expected, channel);
+}
+
+int highest_sample(const DecodedImage& image) {
+  return image.is_wide() ? *std::max_element(image.samples.begin(), image.samples.end()) : 0;
+}
+
+GrayImage to_gray(DecodedImage&& image, const ImageReading& reading) {
   if (!image.is_wide()) return std::move(image.gray);
   const int white = reading.white > 0 ? reading.white : white_above(highest_sample(image));
   for (std::size_t i = 0; i < image.gray.pixels.size(); ++i) {
@@ -125,18 +141,16 @@ GrayImage read(const fs::path& path, std::optional<ImageSize> expected,
   return std::move(image.gray);
 }
 
-}  // namespace
-
 GrayImage read_gray_image(const fs::path& path, const ImageReading& reading) {
-  return read(path, std::nullopt, reading);
+  return to_gray(decode_image_file(path, std::nullopt, reading.channel), reading);
 }
 
 GrayImage read_gray_image(const fs::path& path, ImageSize expected, const ImageReading& reading) {
-  return read(path, expected, reading);
+  return to_gray(decode_image_file(path, expected, reading.channel), reading);
 }
 
 int highest_wide_sample(const fs::path& path) {
-  return highest_sample(decode(path, std::nullopt, GrayChannel::kGrey));
+  return highest_sample(decode_image_file(path, std::nullopt, GrayChannel::kGrey));
 }
 
 int white_above(int sample) {

@@ -63,6 +63,11 @@ std::string decode_jpeg(std::span<const std::uint8_t> file, GrayChannel channel,
   jpeg_create_decompress(&jpeg);
   jpeg_mem_src(&jpeg, file.data(), static_cast<unsigned long>(file.size()));
   jpeg_read_header(&jpeg, TRUE);
+  // A block of 64 pixels takes at least a bit; four times that is allowed, as libjpeg's own memory
+  // is.
+  if (!can_hold(file.size(), 4 * std::uint64_t{jpeg.image_width} * jpeg.image_height)) {
+    return "truncated JPEG";
+  }
   make_room(jpeg.image_width, jpeg.image_height, image.gray);
   const bool one_channel = channel != GrayChannel::kGrey && jpeg.num_components == 3;
   jpeg.out_color_space = one_channel ? JCS_RGB : JCS_GRAYSCALE;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "frontend/input/file_sequence.h"
+#include "frontend/input/kitti_calibration.h"
 #include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"
 
@@ -89,6 +90,10 @@ void read_truth(const fs::path& path, const NumberedFrames& frames, std::size_t 
 }
 
 }  // namespace
+
+Calibrated<RectifiedStereo> read_kitti_stereo(const fs::path& path, bool color, ImageSize size) {
+  return read_calibration(path, color ? kColorPair : kGrayPair, size).stereo;
+}
 
 std::unique_ptr<ImageSequence> open_kitti(const fs::path& path, const std::string& name,
                                           const InputOptions& options) {

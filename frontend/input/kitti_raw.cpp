@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include "frontend/input/file_sequence.h"
+#include "frontend/input/kitti_calibration.h"
 #include "frontend/input/pose_rows.h"
 #include "frontend/input/text_file.h"
 
@@ -22,9 +23,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using RawPair = std::array<const char*, 2>;
-constexpr RawPair kFirstPair{"image_00", "image_01"};
-constexpr RawPair kSecondPair{"image_02", "image_03"};
+using ImageFolders = std::array<const char*, 2>;
+constexpr ImageFolders kFirstPair{"image_00", "image_01"};
+constexpr ImageFolders kSecondPair{"image_02", "image_03"};
 
 // The folder of a camera's images; empty if there is none.
 fs::path images_of(const fs::path& folder, const char* camera) {
@@ -61,7 +62,8 @@ struct RawCalibration {
   Eigen::Vector3d left_in_cam0 = Eigen::Vector3d::Zero();  // [m], in the rectified axes
 };
 
-RawCalibration read_raw_calibration(const fs::path& path, const RawPair& cameras, ImageSize size) {
+RawCalibration read_raw_calibration(const fs::path& path, const ImageFolders& cameras,
+                                    ImageSize size) {
   const auto matrix = [&](const char* camera) {
     return numbers_of(path, "P_rect_" + std::string(camera).substr(6) + ":", 12);
   };
@@ -91,32 +93,6 @@ int take_number(std::string_view& text, char end, const fs::path& path, int line
   }
   text.remove_prefix(size + 1);
   return value;
-}
-
-// "2011-09-26 13:02:25.964389445", in seconds since 1970.
-std::vector<double> read_timestamps(const fs::path& path) {
-  std::vector<double> times;
-  for (const TextLine& line : read_lines(path)) {
-    std::string_view text = line.text;
-    const int year = take_number(text, '-', path, line.number);
-    const int month = take_number(text, '-', path, line.number);
-    const int day = take_number(text, ' ', path, line.number);
-    const int hour = take_number(text, ':', path, line.number);
-    const int minute = take_number(text, ':', path, line.number);
-    const double second = parse_number(text, path, line.number);
-    const std::chrono::year_month_day date{std::chrono::year(year),
-                                           std::chrono::month(static_cast<unsigned>(month)),
-                                           std::chrono::day(static_cast<unsigned>(day))};
-    if (!date.ok()) throw line_error(path, line.number, "no such day");
-    const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-    const double time = 86400.0 * static_cast<double>(days) + 3600 * hour + 60 * minute + second;
-    if (!times.empty() && !(time > times.back())) {
-      throw line_error(path, line.number, "times are not strictly ascending");
-    }
-    times.push_back(time);
-  }
-  if (times.empty()) throw InputError(path.string() + ": holds no times");
-  return times;
 }
 
 // A transform of KITTI raw's calibration: lines R: and T:.
@@ -212,6 +188,36 @@ fs::path raw_calibration_file(const fs::path& folder) {
 
 }  // namespace
 
+std::vector<double> read_kitti_timestamps(const fs::path& path) {
+  std::vector<double> times;
+  for (const TextLine& line : read_lines(path)) {
+    std::string_view text = line.text;
+    const int year = take_number(text, '-', path, line.number);
+    const int month = take_number(text, '-', path, line.number);
+    const int day = take_number(text, ' ', path, line.number);
+    const int hour = take_number(text, ':', path, line.number);
+    const int minute = take_number(text, ':', path, line.number);
+    const double second = parse_number(text, path, line.number);
+    const std::chrono::year_month_day date{std::chrono::year(year),
+                                           std::chrono::month(static_cast<unsigned>(month)),
+                                           std::chrono::day(static_cast<unsigned>(day))};
+    if (!date.ok()) throw line_error(path, line.number, "no such day");
+    const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+    const double time = 86400.0 * static_cast<double>(days) + 3600 * hour + 60 * minute + second;
+    if (!times.empty() && !(time > times.back())) {
+      throw line_error(path, line.number, "times are not strictly ascending");
+    }
+    times.push_back(time);
+  }
+  if (times.empty()) throw InputError(path.string() + ": holds no times");
+  return times;
+}
+
+Calibrated<RectifiedStereo> read_kitti_raw_stereo(const fs::path& path, bool color,
+                                                  ImageSize size) {
+  return read_raw_calibration(path, color ? kSecondPair : kFirstPair, size).stereo;
+}
+
 std::unique_ptr<ImageSequence> open_kitti_raw(const fs::path& path, const std::string& name,
                                               const InputOptions& options) {
   SequenceInfo info;
@@ -220,7 +226,8 @@ std::unique_ptr<ImageSequence> open_kitti_raw(const fs::path& path, const std::s
   if (!folder) return nullptr;
   info.name = folder_name(*folder);
   info.layout = "kitti";
-  const RawPair& cameras = images_of(*folder, kFirstPair[0]).empty() ? kSecondPair : kFirstPair;
+  const ImageFolders& cameras =
+      images_of(*folder, kFirstPair[0]).empty() ? kSecondPair : kFirstPair;
   std::array<NumberedImages, 2> images;
   for (std::size_t side = 0; side < 2; ++side) {
     const fs::path place = images_of(*folder, cameras[side]);
@@ -230,8 +237,8 @@ std::unique_ptr<ImageSequence> open_kitti_raw(const fs::path& path, const std::s
     }
   }
   const fs::path times_path = *folder / cameras[0] / "timestamps.txt";
-  NumberedFrames frames =
-      match_frames(read_timestamps(times_path), times_path, images[0], images[1], info.warnings);
+  NumberedFrames frames = match_frames(read_kitti_timestamps(times_path), times_path, images[0],
+                                       images[1], info.warnings);
   const RawCalibration calibration =
       read_raw_calibration(raw_calibration_file(*folder), cameras, first_image_size(frames.files));
   info.stereo = calibration.stereo;

@@ -93,6 +93,10 @@ std::string decode_png(std::span<const std::uint8_t> file, GrayChannel channel,
   make_room(png_get_image_width(reader.png, reader.info),
             png_get_image_height(reader.png, reader.info), image.gray);
   if (png_get_bit_depth(reader.png, reader.info) == 16) {
+    if (!can_hold(file.size(), 2 * std::uint64_t{image.gray.pixels.size()} *
+                                   png_get_channels(reader.png, reader.info))) {
+      return "truncated PNG";
+    }
     make_wide(reader.png, reader.info, channel, image);
   } else {
     make_gray(reader.png, channel);

@@ -61,6 +61,8 @@ std::string decode_pnm(std::span<const std::uint8_t> file, GrayChannel channel,
   if (!width || !height || !white || *white == 0 || *white > 65535) {
     return "damaged or truncated PGM or PPM header";
   }
+  const std::uint64_t samples = std::uint64_t{*width} * *height * static_cast<unsigned>(channels);
+  if (samples > file.size()) return "truncated PGM or PPM";
   make_room(*width, *height, image.gray);
   if (*white > 255) image.make_wide(channels);
   if (!is_text) reader.skip_byte();

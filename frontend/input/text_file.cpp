@@ -26,6 +26,8 @@ std::string_view unquote(std::string_view field) {
   return quoted ? field.substr(1, field.size() - 2) : field;
 }
 
+constexpr double kMostSeconds = 9.2e9;  // in nanoseconds they fit into 64 bits
+
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 // Words that name columns: no field begins as a number does, or is one.
@@ -205,7 +207,12 @@ std::vector<double> read_times(const fs::path& path, std::vector<std::string>& w
     times.push_back(row.values[0]);
   }
   if (times.empty()) throw InputError(path.string() + ": holds no times");
-  if (times.back() >= kLeastNanoseconds) {
+  const bool nanoseconds = times.back() >= kLeastNanoseconds;
+  const double most = nanoseconds ? 1e9 * kMostSeconds : kMostSeconds;
+  if (times.front() < -most || times.back() > most) {
+    throw InputError(path.string() + ": holds times of more than 292 years");
+  }
+  if (nanoseconds) {
     warnings.push_back(path.string() + ": read as nanoseconds: " +
                        std::to_string(static_cast<std::int64_t>(times.back())) +
                        " is too much for seconds");

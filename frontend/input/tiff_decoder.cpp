@@ -119,9 +119,11 @@ std::string decode(TiffState& state, GrayChannel channel, const MakeRoom& make_r
     return "this kind of TIFF is not read (8 or 16 bits, grey or RGB, in strips are)";
   }
   make_room(width, height, image.gray);
+  const auto row_size = static_cast<std::uint64_t>(TIFFScanlineSize(tiff.get()));
+  if (!can_hold(state.file.size(), row_size * height)) return "truncated TIFF";
   if (kind.bits == 16) image.make_wide(kind.photometric == PHOTOMETRIC_RGB ? 3 : 1);
   const auto needed = std::size_t{width} * kind.samples * (kind.bits / 8);
-  std::vector<std::uint8_t> row(static_cast<std::size_t>(TIFFScanlineSize(tiff.get())));
+  std::vector<std::uint8_t> row(row_size);
   if (row.size() < needed) return "damaged TIFF (its rows are too short)";
   for (int y = 0; y < image.gray.height; ++y) {
     if (TIFFReadScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(y)) != 1) {

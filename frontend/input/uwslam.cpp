@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "cameras/calibration/calibration_file.h"
 #include "frontend/input/camera_poses.h"
 #include "frontend/input/file_sequence.h"
+#include "frontend/input/fisheye_calibration.h"
 #include "frontend/input/text_file.h"
 
 // UWslam: hybrid/<sequence>/images/raw/<number>_{left,right,fish}.<png|jpg> with camera_poses.txt
@@ -86,24 +86,6 @@ Calibrated<RectifiedStereo> read_calibration(const fs::path& place) {
                             place.string());
 }
 
-// Checks it against an image, which also tells a size that the file may leave out.
-Calibrated<KannalaBrandt> read_fisheye_calibration(const fs::path& path, ImageSize image,
-                                                   std::vector<std::string>& warnings) {
-  Calibrated<KannalaBrandt> camera = read_fisheye(path.string(), &warnings);
-  if (camera.width == 0) {
-    camera.width = image.width;
-    camera.height = image.height;
-  }
-  check_image_size(image, {camera.width, camera.height}, path.string());
-  constexpr double kMinAngle = 60;  // [deg] to the axis
-  const double max_angle = KannalaBrandt::max_angle(camera.params.data()) * 180 / std::numbers::pi;
-  if (!(max_angle >= kMinAngle)) {
-    throw InputError(path.string() + ": k1 to k4: the field of view folds at " +
-                     std::to_string(static_cast<int>(max_angle)) + " degrees from the axis");
-  }
-  return camera;
-}
-
 // The fisheye, if it is wanted and there is one.
 void add_fisheye(const fs::path& folder, const NumberedImages& images, SequenceCameras cameras,
                  NumberedFrames& frames, SequenceInfo& info) {
@@ -115,8 +97,8 @@ void add_fisheye(const fs::path& folder, const NumberedImages& images, SequenceC
     return;
   }
   add_fisheye_images(images, frames.first, frames.files, folder.string(), info.warnings);
-  info.fisheye = read_fisheye_calibration(calibration_folder(folder) / "fisheye_calib.yaml",
-                                          first_readable_size(images), info.warnings);
+  info.fisheye = read_fisheye_of_images(calibration_folder(folder) / "fisheye_calib.yaml",
+                                        first_readable_size(images), info.warnings);
 }
 
 // Positions only: "timestamp x y z", or "x y z" with row n belonging to index n.

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "frontend/input/pair_calibration.h"
+
+namespace hybrid_slam {
+
+// Reads the pair's calibration from the first file or, where each camera has one, from the first
+// two, left and right; told by their content:
+//   one file    KITTI's calib.txt, calib_cam_to_cam.txt and perspective.txt (rectified); a Kalibr
+//               camchain (raw); Basalt's JSON (raw); ORB-SLAM's settings: Camera1 and Camera2 (raw,
+//               or rectified if Camera.type is), Camera.fx and Camera.bf (rectified)
+//   two files   EuRoC's sensor.yaml (raw); ROS camera_calibration or CameraInfo (both)
+// `color`: of KITTI's pairs the colour one. `image`: the size of the left images. Throws InputError
+// if there is no such file, or the two do not go together.
+PairCalibration read_pair_calibration(const std::vector<std::string>& files, bool color,
+                                      ImageSize image);
+
+}  // namespace hybrid_slam
