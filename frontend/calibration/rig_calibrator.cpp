@@ -1,0 +1,60 @@
+#include "frontend/calibration/rig_calibrator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/matching/pair_check.h"
+
+namespace hybrid_slam {
+namespace {
+
+constexpr double kAccident = 4.75;  // once in a million: standard deviations, one-sided
+
+}  // namespace
+
+std::shared_ptr<const NoiseFloor> floor_of(const ResidualMap& residuals) {
+  const SystematicPart part = systematic_part(residuals);
+  if (!(part.significance > kAccident)) return nullptr;
+  std::vector<double> variance(residuals.cells.size());
+  for (std::size_t i = 0; i < variance.size(); ++i) {
+    variance[i] = std::max(part.image[i], part.disparity[i] / 2);
+  }
+  return std::make_shared<const NoiseFloor>(residuals.cells, std::move(variance));
+}
+
+bool FloorFinder::follow(const MapSnapshot& map) {
+  const std::size_t keyframes = map.keyframe_count();
+  if (keyframes < next_) return false;
+  while (next_ <= keyframes) next_ += std::min(next_, kMost);
+  auto found = floor_of(residual_map(map, camera_, kMost));
+  const bool changed = found != nullptr || floor_ != nullptr;
+  floor_ = std::move(found);
+  return changed;
+}
+
+// Small keypoints alone: the others' places are coarse.
+void add_rows(const StereoFeatures& features, RowField& rows) {
+  for (std::size_t i = 0; i < features.right_of_left.size(); ++i) {
+    if (features.right_of_left[i] < 0) continue;
+    const Keypoint& left = features.left.keypoints[i];
+    const Keypoint& right =
+        features.right.keypoints[static_cast<std::size_t>(features.right_of_left[i])];
+    if (std::max(left.scale, right.scale) > PairCheck::kSmall) continue;
+    rows.add(left.x, left.y, double{left.y} - right.y);
+  }
+}
+
+double median_disparity(const StereoFeatures& features) {
+  std::vector<double> disparities;
+  for (std::size_t i = 0; i < features.u_right.size(); ++i) {
+    const float u_right = features.u_right[i];
+    if (std::isnan(u_right)) continue;
+    disparities.push_back(double{features.left.keypoints[i].x} - u_right);
+  }
+  if (disparities.empty()) return 0;
+  const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);
+  std::nth_element(disparities.begin(), middle, disparities.end());
+  return *middle;
+}
+
+}  // namespace hybrid_slam
