@@ -15,10 +15,12 @@ struct FlowMatch {
   Eigen::Vector2f position{};  // in the other image [px]
 };
 
+constexpr float kFlowReach = 150;  // [px] either way
+
 // Follows the patches around `points` [px] from one image to another by pyramidal Lucas-Kanade
-// (Bouguet 2000; OpenCV's calcOpticalFlowPyrLK), without a prediction: motions up to some 150 px.
-// Needs neither corners nor descriptors, and so goes on where blur takes both. Kept is what comes
-// back to within a pixel when it is followed backwards. Ascending by point.
+// (Bouguet 2000; OpenCV's calcOpticalFlowPyrLK), without a prediction: motions up to some
+// kFlowReach. Needs neither corners nor descriptors, and so goes on where blur takes both. Kept is
+// what comes back to within a pixel when it is followed backwards. Ascending by point.
 std::vector<FlowMatch> follow_patches(const ImagePyramid& from, const ImagePyramid& to,
                                       std::span<const Eigen::Vector2f> points);
 

@@ -186,17 +186,18 @@ std::string DisparityCalibratorOptions::validate() const {
 
 DisparityCalibrator::DisparityCalibrator(const Calibrated<RectifiedStereo>& camera,
                                          const DisparityCalibratorOptions& options)
-    : camera_(camera), options_(options) {
+    : camera_(camera),
+      options_(options),
+      estimate_(options.prior_sigma, kShareOfPair, options.min_significance) {
   const std::string error = options.validate();
   if (!error.empty()) throw std::invalid_argument("disparity calibrator: " + error);
-  information_ = 1 / (options.prior_sigma * options.prior_sigma);
 }
 
 void DisparityCalibrator::add(const StereoFeatures& previous, double previous_correction,
                               const StereoFeatures& current, double current_correction,
                               const StereoMotion& motion) {
   if (!options_.enabled || static_cast<int>(motion.inliers.size()) < options_.min_matches) return;
-  const double at = estimate();
+  const double at = estimate_.value_now();
   const auto measurement = [&](const StereoFeatures& features, int index, double correction) {
     const auto i = static_cast<std::size_t>(index);
     const Keypoint& left = features.left.keypoints[i];
@@ -224,19 +225,8 @@ void DisparityCalibrator::add(const StereoFeatures& previous, double previous_co
   const double variance = median_chi2(matches) / kMedianChi2;
   const auto step = eliminate_motion(matches, variance);
   if (!step) return;
-  const double information = step->information * kShareOfPair;
-  information_ += information;
-  weighted_sum_ += information * (at + step->step);
   const double noise = variance * squared_sigma / static_cast<double>(matches.size());
-  systematic_sum_ += information * shift_by_model(std::move(disparities), noise);
-}
-
-double DisparityCalibrator::offset() const {
-  return std::abs(estimate()) > options_.min_significance * sigma() ? estimate() : 0;
-}
-
-double DisparityCalibrator::sigma() const {
-  return std::hypot(1 / std::sqrt(information_), systematic());
+  estimate_.add(at + step->step, step->information, shift_by_model(std::move(disparities), noise));
 }
 
 }  // namespace hybrid_slam

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "cameras/camera.h"
+#include "frontend/calibration/running_estimate.h"
 #include "frontend/odometry/stereo_odometer.h"
 
 namespace hybrid_slam {
@@ -38,18 +39,14 @@ class DisparityCalibrator {
   void add(const StereoFeatures& previous, double previous_correction,
            const StereoFeatures& current, double current_correction, const StereoMotion& motion);
 
-  double offset() const;  // [px]; 0 as long as it is not significant
-  double sigma() const;   // standard deviation of the estimate [px]
+  // [px]; 0 as long as it is not significant. Changes at stated numbers of pairs alone.
+  double offset() const { return estimate_.in_use(); }
+  double sigma() const { return estimate_.sigma(); }  // standard deviation of the estimate [px]
 
  private:
-  double estimate() const { return weighted_sum_ / information_; }
-  double systematic() const { return systematic_sum_ / information_; }
-
   Calibrated<RectifiedStereo> camera_;
   DisparityCalibratorOptions options_;
-  double information_ = 0;     // [1 / px^2]
-  double weighted_sum_ = 0;    // information x offset
-  double systematic_sum_ = 0;  // information x what may shift it in every pair alike
+  RunningEstimate estimate_;
 };
 
 }  // namespace hybrid_slam

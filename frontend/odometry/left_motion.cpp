@@ -8,6 +8,7 @@
 #include "backend/map/frame_observations.h"
 #include "frontend/matching/brute_force.h"
 #include "frontend/matching/optical_flow.h"
+#include "frontend/pose/independent_patches.h"
 #include "frontend/pose/pnp_ransac.h"
 #include "frontend/pose/pose_refinement.h"
 
@@ -24,9 +25,9 @@ constexpr float kPatchDistance = 10;  // [px] between patches
 // A point of the previous frame, and where the current one shows it.
 struct LeftMatch {
   int previous = 0;
-  int current = -1;  // keypoint; -1: none, a patch
+  int current = -1;   // keypoint; -1: none, a patch
+  Keypoint keypoint;  // the previous one
   Eigen::Vector3d in_previous;
-  double previous_sigma = 1;
   double current_sigma = 1;
   Eigen::Vector3d measurement;  // (u, v, u_right or NaN)
 };
@@ -38,7 +39,7 @@ std::vector<PoseObservation> observations(const std::vector<LeftMatch>& matches,
   std::vector<PoseObservation> result;
   result.reserve(matches.size());
   for (const LeftMatch& match : matches) {
-    const double before = match.previous_sigma * std::hypot(1.0, motion_in_baselines);
+    const double before = match.keypoint.sigma * std::hypot(1.0, motion_in_baselines);
     result.push_back(
         {match.in_previous, match.measurement, std::hypot(before, match.current_sigma)});
   }
@@ -54,26 +55,45 @@ Matrix6d covariance(const PoseRefinementResult& refined) {
   return level * covariance_of_information(refined.information);
 }
 
+// Patches keep a distance from one another, each tells something of its own; descriptors may not.
+int count_evidence(const std::vector<LeftMatch>& matches) {
+  int patches = 0;
+  std::vector<Keypoint> described;
+  for (const LeftMatch& match : matches) {
+    if (match.current < 0) {
+      ++patches;
+    } else {
+      described.push_back(match.keypoint);
+    }
+  }
+  return patches + count_independent(std::move(described));
+}
+
+// `lost`: patches that were looked for, and gave no match.
 std::optional<StereoMotion> solve(const Calibrated<RectifiedStereo>& camera,
-                                  const std::vector<LeftMatch>& matches, int candidates) {
+                                  const std::vector<LeftMatch>& matches, std::size_t lost) {
   const auto pnp =
       solve_pnp_ransac(bearing_observations(camera, observations(matches, 0)), kRansac);
   if (!pnp) return std::nullopt;
   const double moved = origin_in_a(pnp->cam_from_world).norm() / camera.params[4];
   const auto seen = observations(matches, moved);
-  const PoseRefinementOptions options;
+  const PoseRefinementOptions options{.first_scale = 4};  // most matches are wrong, the pose is not
   const PoseRefinementResult refined = refine_pose(camera, pnp->cam_from_world, seen, options);
   StereoMotion motion;
   motion.current_from_previous = refined.cam_from_world;
   motion.covariance = covariance(refined);
-  motion.matches = candidates;
+  motion.matches = static_cast<int>(matches.size() + lost);
   std::vector<double> depths;
+  std::vector<LeftMatch> agreeing;
   const double area = static_cast<double>(camera.width) * camera.height;
+  const double reached = std::min(area, 4.0 * kFlowReach * kFlowReach);
   double chance = 0;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    chance += chance_in_area(seen[i].sigma, options.chi2_mono, area);
+    chance +=
+        chance_in_area(seen[i].sigma, options.chi2_mono, matches[i].current >= 0 ? area : reached);
     if (!refined.inlier[i]) continue;
     depths.push_back(matches[i].in_previous.norm());
+    agreeing.push_back(matches[i]);
     if (matches[i].current >= 0) {
       motion.inliers.push_back({matches[i].previous, matches[i].current});
     } else {
@@ -81,8 +101,9 @@ std::optional<StereoMotion> solve(const Calibrated<RectifiedStereo>& camera,
     }
   }
   if (!motion.covariance.allFinite()) return std::nullopt;
-  motion.support = {.candidates = candidates,
+  motion.support = {.candidates = count_evidence(matches) + static_cast<int>(lost),
                     .inliers = refined.inliers,
+                    .evidence = count_evidence(agreeing),
                     .chance = chance / static_cast<double>(matches.size()),
                     .covariance = motion.covariance,
                     .depth = median_of(std::move(depths))};
@@ -148,12 +169,12 @@ std::optional<StereoMotion> motion_by_left_matches(const Calibrated<RectifiedSte
     const Keypoint& now = current.left.keypoints[j];
     matches.push_back({points.index[i],
                        found.train,
+                       points.features.keypoints[i],
                        points.in_previous[i],
-                       points.features.keypoints[i].sigma,
                        now.sigma,
                        {now.x, now.y, current.u_right[j]}});
   }
-  return solve(camera, matches, static_cast<int>(matches.size()));
+  return solve(camera, matches, 0);
 }
 
 std::optional<StereoMotion> motion_by_patches(const Calibrated<RectifiedStereo>& camera,
@@ -172,12 +193,12 @@ std::optional<StereoMotion> motion_by_patches(const Calibrated<RectifiedStereo>&
     const std::size_t i = followed[static_cast<std::size_t>(flow.point)];
     matches.push_back({points.index[i],
                        -1,
+                       points.features.keypoints[i],
                        points.in_previous[i],
-                       points.features.keypoints[i].sigma,
                        kPatchSigma,
                        {flow.position.x(), flow.position.y(), kNoRightMatch}});
   }
-  return solve(camera, matches, static_cast<int>(followed.size()));
+  return solve(camera, matches, followed.size() - matches.size());
 }
 
 }  // namespace hybrid_slam

@@ -72,7 +72,7 @@ std::optional<Explained> explain(const std::vector<NoisyResidual>& points) {
   for (const NoisyResidual& point : points) {
     information += point.efficiency * point.by_motion.transpose() * point.weight * point.by_motion;
   }
-  if (!is_determined<6>(information)) return std::nullopt;
+  if (!is_determined(information)) return std::nullopt;
   const Matrix6d inverse = information.inverse();
   Explained result;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -153,7 +153,7 @@ std::optional<Matrix6d> stereo_motion_covariance(const Params& params,
   for (std::size_t k = 0; k < 3; ++k) {
     covariance += variance[static_cast<Eigen::Index>(k)] * explained->of_motion[k];
   }
-  if (!is_determined<6>(covariance)) return std::nullopt;
+  if (!is_determined(covariance)) return std::nullopt;
   return Matrix6d(0.5 * (covariance + covariance.transpose()));
 }
 

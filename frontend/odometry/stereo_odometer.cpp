@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "frontend/pose/independent_patches.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -44,8 +46,11 @@ std::optional<StereoMotion> StereoOdometer::estimate(const StereoFeatures& previ
   motion.current_from_previous = solution->current_from_previous;
   motion.covariance = solution->covariance;
   motion.matches = static_cast<int>(matches.size());
-  for (const int i : solution->inliers) {
-    motion.inliers.push_back(matches[static_cast<std::size_t>(i)]);
+  auto inlier = solution->inliers.begin();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const bool agrees = inlier != solution->inliers.end() && static_cast<std::size_t>(*inlier) == i;
+    if (agrees) ++inlier;
+    (agrees ? motion.inliers : motion.outliers).push_back(matches[i]);
   }
   motion.support = support(motion, previous);
   return motion;
@@ -54,15 +59,22 @@ std::optional<StereoMotion> StereoOdometer::estimate(const StereoFeatures& previ
 PoseSupport StereoOdometer::support(const StereoMotion& motion,
                                     const StereoFeatures& previous) const {
   std::vector<double> depths;
+  std::vector<Keypoint> all, agreeing;
+  for (const CircularMatch& match : motion.outliers) {
+    all.push_back(previous.left.keypoints[static_cast<std::size_t>(match.previous)]);
+  }
   for (const CircularMatch& match : motion.inliers) {
     const auto i = static_cast<std::size_t>(match.previous);
     const Keypoint& before = previous.left.keypoints[i];
     const auto point = triangulate_stereo(camera_, {before.x, before.y, previous.u_right[i]});
     if (point) depths.push_back(point->norm());
+    agreeing.push_back(before);
   }
+  all.insert(all.end(), agreeing.begin(), agreeing.end());
   const double area = static_cast<double>(camera_.width) * camera_.height;
-  return {.candidates = motion.matches,
+  return {.candidates = count_independent(std::move(all)),
           .inliers = static_cast<int>(motion.inliers.size()),
+          .evidence = count_independent(std::move(agreeing)),
           .chance = chance_in_area(options_.inlier_threshold, 1, area),
           .covariance = motion.covariance,
           .depth = median_of(std::move(depths))};

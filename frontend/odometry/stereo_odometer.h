@@ -16,7 +16,8 @@ struct StereoMotion {
   Rigid3d current_from_previous;
   Matrix6d covariance = Matrix6d::Zero();  // of its left perturbation: see StereoMotionSolution
   std::vector<CircularMatch> inliers;
-  int matches = 0;      // before RANSAC
+  std::vector<CircularMatch> outliers;  // the other matches; of circular ones only
+  int matches = 0;                      // before RANSAC
   int patches = 0;      // inliers that were followed as patches, and are no keypoints
   PoseSupport support;  // what speaks for it
 };

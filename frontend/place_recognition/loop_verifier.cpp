@@ -10,6 +10,7 @@
 #include "frontend/matching/projection_matcher.h"
 #include "frontend/place_recognition/guided_matching.h"
 #include "frontend/place_recognition/loop_side.h"
+#include "frontend/pose/direction_residual.h"
 
 namespace hybrid_slam {
 namespace {

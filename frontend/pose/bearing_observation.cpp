@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "frontend/pose/damped_gauss_newton.h"
+#include "frontend/pose/direction_residual.h"
 
 namespace hybrid_slam {
 namespace {

@@ -2,15 +2,14 @@
 
 #include <optional>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
 #include "cameras/geometry/se3.h"
 
 namespace hybrid_slam {
 
 // Least squares in N unknowns, linearised: cost + 2 gradient . step + step . information step.
+// `solve` is defined in normal_equations.cpp, for N of 1, 2, 3, 6 and 7.
 template <int N>
 struct NormalEquations {
   using Step = Eigen::Matrix<double, N, 1>;
@@ -37,26 +36,11 @@ struct NormalEquations {
 
   // The step that minimises the linearised cost, each diagonal entry enlarged by the factor
   // 1 + damping. None if it is not finite.
-  std::optional<Step> solve(double damping) const {
-    Matrix damped = full_information();
-    damped.diagonal() *= 1 + damping;
-    const Step step = -damped.ldlt().solve(gradient);
-    if (!step.allFinite()) return std::nullopt;
-    return step;
-  }
+  std::optional<Step> solve(double damping) const;
 };
 
 // Whether a system (symmetric) determines all its unknowns, whatever the units of each.
-template <int N>
-bool is_determined(Eigen::Matrix<double, N, N> information) {
-  constexpr double kMinConditioning = 1e-12;  // smallest / largest eigenvalue of the scaled system
-  if (!(information.diagonal().minCoeff() > 0) || !information.allFinite()) return false;
-  const Eigen::Matrix<double, N, 1> scale = information.diagonal().cwiseSqrt().cwiseInverse();
-  information = scale.asDiagonal() * information * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> eigen(information,
-                                                                         Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues()[0] > kMinConditioning * eigen.eigenvalues()[N - 1];
-}
+bool is_determined(const Eigen::Ref<const Eigen::MatrixXd>& information);
 
 // d residual / d pose (N x 6, left perturbation) from d residual / d point_in_cam (N x 3): a
 // perturbed pose moves the point by translation + rotation x point.

@@ -9,6 +9,7 @@
 #include <opengv/absolute_pose/CentralAbsoluteAdapter.hpp>
 #include <opengv/absolute_pose/methods.hpp>
 
+#include "frontend/pose/direction_residual.h"
 #include "frontend/pose/mlpnp.h"
 #include "frontend/pose/random_sampler.h"
 

@@ -25,7 +25,7 @@ double log10_choose(int n, int k) {
 
 double log10_false_alarms(const PoseSupport& support, int sample) {
   const int n = support.candidates;
-  const int k = support.inliers;
+  const int k = support.evidence;
   if (k <= sample || k > n) return std::numeric_limits<double>::infinity();
   return std::log10(n - sample) + log10_choose(n, k) + log10_choose(k, sample) +
          (k - sample) * std::log10(std::clamp(support.chance, 1e-12, 1.0));
@@ -54,7 +54,7 @@ double chance_in_area(double sigma, double chi2, double area) {
 }
 
 Matrix6d covariance_of_information(const Matrix6d& information) {
-  return is_determined<6>(information) ? Matrix6d(information.inverse()) : PoseSupport().covariance;
+  return is_determined(information) ? Matrix6d(information.inverse()) : PoseSupport().covariance;
 }
 
 double median_of(std::vector<double> values) {

@@ -9,8 +9,9 @@ namespace hybrid_slam {
 
 // What speaks for a pose.
 struct PoseSupport {
-  int candidates = 0;  // matches that it was looked for in, right or wrong
-  int inliers = 0;     // of these, that agree with it
+  int candidates = 0;  // matches that it was looked for in, right or wrong: independent ones
+  int inliers = 0;     // matches that agree with it, all of them
+  int evidence = 0;    // independent ones that agree: see independent_patches.h
   // That a wrong match agrees with a given pose: the area around the point's projection that counts
   // as agreement, over the area in which the match was looked for. At most 1.
   double chance = 1;
@@ -19,11 +20,11 @@ struct PoseSupport {
   double depth = 0;  // median distance of the inliers' points [m]
 };
 
-// log10 of the number of poses with so many inliers that are to be expected among wrong matches
-// alone. `sample` of the inliers made the pose; the others agreed by themselves:
+// log10 of the number of poses with so much evidence that is to be expected among wrong matches
+// alone. `sample` of it made the pose; the rest agreed by themselves:
 //   (n - s) C(n, k) C(k, s) chance^(k - s),
 // Moisan and Stival, "A probabilistic criterion to detect rigid point matches", IJCV 2004, eq. 7,
-// with a tolerance that is fixed beforehand. Infinite with no more inliers than the sample.
+// with a tolerance that is fixed beforehand. Infinite with no more evidence than the sample.
 double log10_false_alarms(const PoseSupport& support, int sample = 3);
 
 // Fewer than one in a million frames.

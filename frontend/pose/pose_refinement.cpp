@@ -55,8 +55,7 @@ class PoseRefiner {
   PoseRefinementResult run(const Rigid3d& initial) {
     PoseRefinementResult result;
     result.cam_from_world = initial;
-    // Everything that can be projected takes part in the first round.
-    select(initial, kInfinity);
+    select(initial, options_.first_scale);
     for (int round = 0; round < options_.rounds && inliers_ >= kMinObservations; ++round) {
       const bool robust = round < options_.robust_rounds;
       const bool last = round + 1 == options_.rounds;

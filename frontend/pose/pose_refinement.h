@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct PoseRefinementOptions {
   int robust_rounds = 2;       // Huber loss in the first rounds, none after
   double chi2_mono = 5.991;    // 95 %, 2 degrees of freedom
   double chi2_stereo = 7.815;  // 95 %, 3 degrees of freedom
+  // Who takes part in the first round: up to so many times chi2. All by default; less where the
+  // initial pose is close and most observations are wrong.
+  double first_scale = std::numeric_limits<double>::infinity();
 };
 
 struct PoseRefinementResult {

@@ -7,6 +7,7 @@
 
 #include "cameras/geometry/so3.h"
 #include "frontend/pose/damped_gauss_newton.h"
+#include "frontend/pose/direction_residual.h"
 #include "frontend/pose/random_sampler.h"
 #include "frontend/pose/rigid_alignment.h"
 
@@ -89,7 +90,7 @@ std::optional<Sim3d> minimize(Pairs pairs, const std::vector<char>& inlier, cons
   const auto minimum = damped_gauss_newton<N>(
       a_from_b, [&](const Sim3d& pose) { return linearize<N>(pairs, inlier, pose); }, moved<N>,
       kStop);
-  if (!minimum || !is_determined<N>(minimum->equations.full_information())) return std::nullopt;
+  if (!minimum || !is_determined(minimum->equations.full_information())) return std::nullopt;
   return minimum->state;
 }
 

@@ -39,6 +39,10 @@ class FisheyeTracker {
   TrackedFrame track(Frame frame, const MapSnapshot& map, KeyframeId stereo_reference,
                      bool allow_keyframe = true);
 
+  // What the camera's keypoints are off by besides their own noise, from now on; null: nothing.
+  // Those of the frames to come have it in their standard deviations already.
+  void use_floor(std::shared_ptr<const NoiseFloor> floor) { matcher_.use_floor(std::move(floor)); }
+
   // What the last frame's pose is off by, for relative_pose(); null if it was lost.
   const UncertainPose* uncertain_pose() const { return uncertain_ ? &*uncertain_ : nullptr; }
 

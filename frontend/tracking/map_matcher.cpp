@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "frontend/pose/independent_patches.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -62,7 +64,13 @@ PoseSupport MapMatcher::refine(const MapSnapshot& map, const Search& search, Fra
 MapMatcher::Search MapMatcher::search_of(const MapSnapshot& map, const Frame& frame,
                                          std::span<const LandmarkPrediction> predictions) const {
   const double area = static_cast<double>(image_width(camera_)) * image_height(camera_);
-  return {static_cast<int>(predictions.size()),
+  std::vector<Keypoint> places;
+  for (const LandmarkPrediction& prediction : predictions) {
+    places.push_back({.x = static_cast<float>(prediction.pixel.x()),
+                      .y = static_cast<float>(prediction.pixel.y()),
+                      .scale = static_cast<float>(prediction.scale)});
+  }
+  return {count_independent(std::move(places)),
           static_cast<double>(frame.size()) / area *
               accidental_match_rate(map, view_of(frame), predictions, options_.matcher)};
 }
@@ -86,15 +94,19 @@ PoseSupport MapMatcher::refine_with(const PoseRefinementOptions& options, const 
   support.candidates = search.landmarks;
   std::vector<LandmarkId> kept(frame.size());
   std::vector<double> depths;
+  std::vector<Keypoint> agreeing;
   double chances = 0;
   for (std::size_t i = 0; i < keypoint.size(); ++i) {
     if (!refined.inlier[i]) continue;
     chances += chance_in_area(frame.features.left.keypoints[keypoint[i]].sigma, options.chi2_mono,
                               1 / search.accidents_per_area);
+    agreeing.push_back(frame.features.left.keypoints[keypoint[i]]);
     kept[keypoint[i]] = frame.landmarks[keypoint[i]];
     depths.push_back((refined.cam_from_world * observations[i].point_in_world).norm());
   }
   support.inliers = static_cast<int>(depths.size());
+  support.evidence = count_independent(std::move(agreeing));
+  support.candidates = std::max(support.candidates, support.evidence);
   if (support.inliers > 0) support.chance = chances / support.inliers;
   support.covariance = covariance_of_information(refined.information);
   support.depth = median_of(std::move(depths));

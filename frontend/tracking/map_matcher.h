@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backend/map/map_edit.h"
@@ -52,8 +53,9 @@ class MapMatcher {
 
   FeatureView view_of(const Frame& frame) const;
 
-  // Landmarks that were looked for, and the mean chance that a keypoint has to match one by
-  // accident: keypoints per area times accidental_match_rate() [1 / px^2].
+  // Landmarks that were looked for, independent ones (independent_patches.h), and the mean chance
+  // that a keypoint has to match one by accident: keypoints per area times accidental_match_rate()
+  // [1 / px^2].
   struct Search {
     int landmarks = 0;
     double accidents_per_area = 0;
@@ -105,6 +107,9 @@ class MapMatcher {
   void learn_shading(const MapSnapshot& map, const Frame& frame) {
     refiner_.learn_shading(map, frame);
   }
+
+  // See TrackRefiner.
+  void use_floor(std::shared_ptr<const NoiseFloor> floor) { refiner_.use_floor(std::move(floor)); }
 
   // See TrackRefiner.
   double shading() const { return refiner_.shading(); }

@@ -5,6 +5,7 @@
 
 #include "frontend/matching/brute_force.h"
 #include "frontend/place_recognition/guided_matching.h"
+#include "frontend/pose/independent_patches.h"
 
 namespace hybrid_slam {
 namespace {
@@ -69,14 +70,19 @@ void search_around(const MapSnapshot& map, const FeatureView& view,
 
 // The matches were looked for all over the image.
 PoseSupport support_of(const PnpResult& pnp, const std::vector<PoseObservation>& observations,
-                       const Camera& camera, const PoseRefinementOptions& options) {
-  const double area = static_cast<double>(image_width(camera)) * image_height(camera);
+                       const std::vector<std::size_t>& keypoint, const FeatureView& view,
+                       const PoseRefinementOptions& options) {
+  const double area = static_cast<double>(image_width(view.camera)) * image_height(view.camera);
   double chances = 0;
-  for (const PoseObservation& o : observations) {
-    chances += chance_in_area(o.sigma, options.chi2_mono, area);
+  std::vector<Keypoint> all, agreeing;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    chances += chance_in_area(observations[i].sigma, options.chi2_mono, area);
+    all.push_back(view.features.keypoints[keypoint[i]]);
+    if (pnp.inlier[i]) agreeing.push_back(all.back());
   }
-  return {.candidates = static_cast<int>(observations.size()),
+  return {.candidates = count_independent(std::move(all)),
           .inliers = pnp.inliers,
+          .evidence = count_independent(std::move(agreeing)),
           .chance = chances / static_cast<double>(observations.size())};
 }
 
@@ -89,7 +95,7 @@ std::optional<RelocalizedFrame> try_keyframe(const MapSnapshot& map, const Featu
   const auto observations = pose_observations(map, view.features, view.u_right, matched, keypoint);
   const auto pnp =
       solve_pnp_ransac(bearing_observations(view.camera, observations), options.ransac);
-  if (!pnp || !is_no_accident(support_of(*pnp, observations, view.camera, pose))) {
+  if (!pnp || !is_no_accident(support_of(*pnp, observations, keypoint, view, pose))) {
     return std::nullopt;
   }
   RelocalizedFrame frame{.cam_from_world = pnp->cam_from_world,

@@ -118,10 +118,10 @@ ShadedTrack make_shaded_track(const Calibrated<RectifiedStereo>& camera,
           .sigma = double{now.sigma}};
 }
 
-ShadingCalibrator::ShadingCalibrator(const ShadingCalibratorOptions& options) : options_(options) {
+ShadingCalibrator::ShadingCalibrator(const ShadingCalibratorOptions& options)
+    : options_(options), estimate_(options.prior_sigma, kShareOfTrack, options.min_significance) {
   const std::string error = options.validate();
   if (!error.empty()) throw std::invalid_argument(error);
-  information_ = 1 / (options.prior_sigma * options.prior_sigma);
 }
 
 void ShadingCalibrator::add(const std::vector<ShadedTrack>& tracks, double corrected) {
@@ -135,20 +135,11 @@ void ShadingCalibrator::add(const std::vector<ShadedTrack>& tracks, double corre
     if (!better) return;
     fit = *better;
   }
-  const double information = fit.information * kShareOfTrack;
-  information_ += information;
-  weighted_sum_ += information * (corrected + fit.parameters.z());
+  estimate_.add(corrected + fit.parameters.z(), fit.information);
 }
 
 double ShadingCalibrator::relative_depth(double depth_per_size, double size) {
   return depth_per_size * kReferenceSize * std::pow(size / kReferenceSize, kReliefExponent);
 }
-
-double ShadingCalibrator::depth_per_size() const {
-  const double estimate = weighted_sum_ / information_;
-  return std::abs(estimate) > options_.min_significance * sigma() ? estimate : 0;
-}
-
-double ShadingCalibrator::sigma() const { return 1 / std::sqrt(information_); }
 
 }  // namespace hybrid_slam

@@ -6,6 +6,7 @@
 #include "backend/map/features.h"
 #include "cameras/camera.h"
 #include "cameras/geometry/rigid3d.h"
+#include "frontend/calibration/running_estimate.h"
 
 namespace hybrid_slam {
 
@@ -56,16 +57,16 @@ class ShadingCalibrator {
   void add(const std::vector<ShadedTrack>& tracks, double corrected);
 
   // Shading depth over size, of features of one milliradian; 0 as long as it is not significant.
-  double depth_per_size() const;
-  double sigma() const;  // standard deviation of the estimate
+  // Changes at stated numbers of keyframes alone.
+  double depth_per_size() const { return estimate_.in_use(); }
+  double sigma() const { return estimate_.sigma(); }  // standard deviation of the estimate
 
   // Shading depth over depth, of features of `size` [rad].
   static double relative_depth(double depth_per_size, double size);
 
  private:
   ShadingCalibratorOptions options_;
-  double information_ = 0;
-  double weighted_sum_ = 0;  // information x depth per size
+  RunningEstimate estimate_;
 };
 
 }  // namespace hybrid_slam

@@ -9,9 +9,11 @@
 namespace hybrid_slam {
 namespace {
 
-// From the stereo match; none without one.
+// From the stereo match; none without one, or where it is left out.
 std::optional<Eigen::Vector3d> point_in_cam(const Camera& camera, const Frame& frame,
-                                            std::size_t keypoint) {
+                                            std::size_t keypoint,
+                                            const LeftOutKeypoints& left_out) {
+  if (!left_out.empty() && left_out[keypoint]) return std::nullopt;
   const Keypoint& left = frame.features.left.keypoints[keypoint];
   return triangulate_stereo(camera, {left.x, left.y, frame.features.u_right[keypoint]});
 }
@@ -36,11 +38,12 @@ void for_each_well_founded(const MapSnapshot& map, KeyframeId id, const Visit& v
 }  // namespace
 
 std::optional<StereoCoverage> stereo_coverage(const Camera& camera, const Frame& frame,
-                                              double close_depth) {
+                                              double close_depth,
+                                              const LeftOutKeypoints& left_out) {
   StereoCoverage coverage;
   std::vector<double> depths;
   for (std::size_t i = 0; i < frame.size(); ++i) {
-    const auto point = point_in_cam(camera, frame, i);
+    const auto point = point_in_cam(camera, frame, i, left_out);
     if (!point) {
       continue;
     }
@@ -65,7 +68,8 @@ int count_well_founded(const MapSnapshot& map, KeyframeId id) {
 }
 
 ReferenceOverlap reference_overlap(const MapSnapshot& map, KeyframeId reference,
-                                   const Camera& camera, const Frame& frame) {
+                                   const Camera& camera, const Frame& frame,
+                                   const LeftOutKeypoints& left_out) {
   ReferenceOverlap overlap;
   for_each_well_founded(map, reference, [&](const Landmark& landmark) {
     ++overlap.landmarks;
@@ -75,7 +79,7 @@ ReferenceOverlap reference_overlap(const MapSnapshot& map, KeyframeId reference,
   const Rigid3d reference_from_frame =
       map.cam_from_world(reference) * inverse(frame.cam_from_world);
   for (std::size_t i = 0; i < frame.size(); ++i) {
-    const auto point = point_in_cam(camera, frame, i);
+    const auto point = point_in_cam(camera, frame, i, left_out);
     if (!point) continue;
     ++overlap.points;
     overlap.new_points +=
@@ -86,14 +90,15 @@ ReferenceOverlap reference_overlap(const MapSnapshot& map, KeyframeId reference,
 }
 
 NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,
-                                 KeyframeId reference, double close_depth, int min_new_points) {
+                                 KeyframeId reference, double close_depth, int min_new_points,
+                                 const LeftOutKeypoints& left_out) {
   struct Candidate {
     std::uint32_t index;
     Eigen::Vector3d point;  // in the camera
   };
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < frame.size(); ++i) {
-    const auto point = point_in_cam(camera, frame, i);
+    const auto point = point_in_cam(camera, frame, i, left_out);
     if (point && !frame.landmarks[i].valid()) {
       candidates.push_back({static_cast<std::uint32_t>(i), *point});
     }

@@ -8,6 +8,10 @@
 
 namespace hybrid_slam {
 
+// Keypoints of a frame of which no point shall be made, one entry each; empty: none. For what moves
+// by itself.
+using LeftOutKeypoints = std::vector<bool>;
+
 // What a stereo frame sees at depths that one pair can tell.
 struct StereoCoverage {
   int close_tracked = 0;    // close keypoints with a landmark
@@ -17,7 +21,8 @@ struct StereoCoverage {
 
 // `close_depth` [m]: nearer points are close. None if no keypoint has a depth.
 std::optional<StereoCoverage> stereo_coverage(const Camera& camera, const Frame& frame,
-                                              double close_depth);
+                                              double close_depth,
+                                              const LeftOutKeypoints& left_out = {});
 
 // Landmarks of a keyframe that enough others have seen to be relied on; 0 if it has been culled.
 int count_well_founded(const MapSnapshot& map, KeyframeId keyframe);
@@ -33,11 +38,13 @@ struct ReferenceOverlap {
   double new_ground() const { return points == 0 ? 0 : static_cast<double>(new_points) / points; }
 };
 ReferenceOverlap reference_overlap(const MapSnapshot& map, KeyframeId reference,
-                                   const Camera& camera, const Frame& frame);
+                                   const Camera& camera, const Frame& frame,
+                                   const LeftOutKeypoints& left_out = {});
 
 // The frame as a keyframe with its landmarks. Of the keypoints with depth and without a landmark,
 // every close one makes a new point, and at least the `min_new_points` nearest do.
 NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,
-                                 KeyframeId reference, double close_depth, int min_new_points);
+                                 KeyframeId reference, double close_depth, int min_new_points,
+                                 const LeftOutKeypoints& left_out = {});
 
 }  // namespace hybrid_slam

@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "cameras/geometry/se3.h"
-#include "frontend/tracking/stereo_keyframe.h"
+#include "cameras/geometry/uncertain_motion.h"
 
 namespace hybrid_slam {
 namespace {
@@ -34,7 +34,7 @@ bool agrees(const StereoMotion& motion, const Rigid3d& predicted, const Rigid3d&
             const Matrix6d& map_covariance) {
   const Vector6d off = se3_log(by_map * inverse(predicted));
   const Matrix6d covariance = motion.covariance + 2 * map_covariance;
-  return off.dot(covariance.ldlt().solve(off)) <= kMaxDisagreement;
+  return squared_mahalanobis(off, covariance) <= kMaxDisagreement;
 }
 
 // The reference of the last tracked frame, those that share landmarks with it, and the newest.
@@ -83,6 +83,7 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
       ladder_(camera, options.odometer),
       disparity_(camera, options.disparity),
       matcher_(camera_id, camera, options, std::move(places)),
+      moving_(camera.width, camera.height),
       last_(camera_id) {
   const std::string error = options.validate();
   if (!error.empty()) {
@@ -237,48 +238,6 @@ std::optional<LadderStep> StereoTracker::across_gap(const Frame& frame) const {
   return step;
 }
 
-TrackedFrame StereoTracker::initialize(Frame& frame, const MapSnapshot& map) const {
-  TrackedFrame result;
-  result.frame_index = frame.index;
-  result.time = frame.time;
-  if (!can_carry_map(frame)) return result;
-  result.source = PoseSource::kInitialization;
-  result.keyframe = make_keyframe(frame, map, KeyframeId());
-  return result;
-}
-
-// Whether one pair shows enough to begin a map, or a component of it.
-bool StereoTracker::can_carry_map(const Frame& frame) const {
-  const auto enough = static_cast<long>(options_.min_initial_share * options_.max_features);
-  const auto& u_right = frame.features.u_right;
-  const auto with_depth =
-      std::count_if(u_right.begin(), u_right.end(), [](float u) { return !std::isnan(u); });
-  return static_cast<long>(frame.size()) >= enough && with_depth >= enough;
-}
-
-// Where the vehicle is against the map is not known: the frame gets the pose of the newest stereo
-// keyframe, as good as any, and is held there by nothing.
-void StereoTracker::begin_component(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
-  const Keyframe* const newest = map.newest_keyframe(camera_id_);
-  const auto coverage = stereo_coverage(camera_, frame, close_depth());
-  if (newest == nullptr || !coverage || !can_carry_map(frame)) return;
-  clear(frame);
-  frame.cam_from_world = newest->cam_from_world;
-  result.counts = {};
-  result.source = PoseSource::kInitialization;
-  result.prediction = Prediction::kNone;
-  result.reference = newest->id;
-  result.keyframe = make_stereo_keyframe(camera_id_, camera_, frame, newest->id, close_depth(),
-                                         options_.min_new_points);
-  Odometry odometry;
-  odometry.previous = newest->id;
-  odometry.motion = unknown_motion(Rigid3d());
-  uncertain_ = moved(UncertainPose::of_keyframe(camera_id_, frame.index, newest->id),
-                     odometry.motion, frame.index);
-  depth_ = coverage->median_depth;
-  result.keyframe->odometry = std::make_shared<const Odometry>(std::move(odometry));
-}
-
 void StereoTracker::correct_disparities(Frame& frame) const {
   frame.u_right_correction = disparity_.offset();
   for (float& u_right : frame.features.u_right) {
@@ -294,6 +253,7 @@ std::optional<LadderStep> StereoTracker::predict(Frame& frame, TrackedFrame& res
   if (step && step->rung == Prediction::kOdometer) {
     disparity_.add(last.features, last.u_right_correction, frame.features, frame.u_right_correction,
                    step->motion);
+    if (options_.moving_regions && step->believed) learn_moving(*step, frame);
   }
   if (!step) step = across_gap(frame);
   if (step) {
@@ -364,37 +324,6 @@ std::optional<MapMatcher::LocalMapMatch> StereoTracker::track_local_map(
     seeds = valid_ids(reference->landmarks);
   }
   return matcher_.match_local_map(map, seeds, frame);
-}
-
-bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
-                                   const TrackedFrame& result) const {
-  const auto coverage = stereo_coverage(camera_, frame, close_depth());
-  if (!coverage) {
-    return false;
-  }
-  KeyframeEvidence evidence;
-  evidence.inliers = result.inliers;
-  const ReferenceOverlap overlap = reference_overlap(map, result.reference, camera_, frame);
-  evidence.reference_landmarks = overlap.landmarks;
-  evidence.overlap = overlap.share();
-  evidence.new_ground = overlap.new_ground();
-  evidence.close_tracked = coverage->close_tracked;
-  evidence.close_untracked = coverage->close_untracked;
-  evidence.frames_since_keyframe = static_cast<int>(frame.index - last_.keyframe_frame());
-  evidence.seconds_since_keyframe = frame.time - last_.keyframe_time();
-  evidence.keyframes = map.keyframe_count();
-  evidence.motion = result.cam_from_reference.translation().norm() / coverage->median_depth;
-  evidence.by_odometry = result.source == PoseSource::kOdometer;
-  return needs_keyframe(evidence, options_.max_features, options_.keyframes);
-}
-
-NewKeyframe StereoTracker::make_keyframe(const Frame& frame, const MapSnapshot& map,
-                                         KeyframeId reference) const {
-  NewKeyframe keyframe = make_stereo_keyframe(camera_id_, camera_, frame, reference, close_depth(),
-                                              options_.min_new_points);
-  const Keyframe* last = map.find_frame(camera_id_, last_.keyframe_frame());
-  if (last != nullptr) keyframe.odometry = chain_.odometry(last->id);
-  return keyframe;
 }
 
 TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, TrackedFrame result) {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backend/map/map_snapshot.h"
@@ -12,6 +13,8 @@
 #include "frontend/tracking/last_frame.h"
 #include "frontend/tracking/map_matcher.h"
 #include "frontend/tracking/motion_ladder.h"
+#include "frontend/tracking/moving_regions.h"
+#include "frontend/tracking/stereo_keyframe.h"
 #include "frontend/tracking/tracked_frame.h"
 #include "frontend/tracking/uncertain_pose.h"
 
@@ -31,6 +34,8 @@ struct StereoTrackerOptions : TrackerOptions {
   // Whether the map goes on with another component where the vehicle is lost and sees no place that
   // it knows; see backend/map/components.h.
   bool new_components = true;
+  // Whether what moves by itself is kept out of the map; see MovingRegions.
+  bool moving_regions = true;
   StereoOdometerOptions odometer;
   DisparityCalibratorOptions disparity;
 
@@ -52,10 +57,16 @@ class StereoTracker {
   // `allow_keyframe`: false while mapping has more waiting than it can take.
   TrackedFrame track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);
 
+  // What the camera's keypoints are off by besides their own noise, from now on; null: nothing.
+  // Those of the frames to come have it in their standard deviations already.
+  void use_floor(std::shared_ptr<const NoiseFloor> floor) { matcher_.use_floor(std::move(floor)); }
+
   // What the last frame's pose is off by, for relative_pose(); null if it was not tracked.
   const UncertainPose* uncertain_pose() const {
     return uncertain_ && last_.tracked() ? &*uncertain_ : nullptr;
   }
+
+  const DisparityCalibrator& disparity() const { return disparity_; }
 
  private:
   // A frame since the last tracked one, whose place is not known well enough.
@@ -84,6 +95,8 @@ class StereoTracker {
                                                            const MapSnapshot& map) const;
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
   NewKeyframe make_keyframe(const Frame& frame, const MapSnapshot& map, KeyframeId reference) const;
+  void learn_moving(const LadderStep& step, const Frame& frame);
+  LeftOutKeypoints moving(const Frame& frame) const;
   double close_depth() const { return options_.close_baselines * baseline(camera_); }
   TrackedFrame remember(const MapSnapshot& map, Frame frame, TrackedFrame result);
 
@@ -94,6 +107,7 @@ class StereoTracker {
   OdometryChain chain_;
   DisparityCalibrator disparity_;
   MapMatcher matcher_;
+  MovingRegions moving_;
   LastFrame last_;
   std::optional<UncertainPose> uncertain_;  // the last tracked frame
   double depth_ = 0;                        // of the scene that it showed [m]

@@ -147,6 +147,7 @@ bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landm
   keypoint.y = static_cast<float>(position.y());
   keypoint.sigma = std::max(static_cast<float>(options_.min_sigma),
                             static_cast<float>(options_.sigma) * reference.keypoint->scale);
+  if (floor_) keypoint.sigma = floor_->over(keypoint.sigma, keypoint.x, keypoint.y);
   if (!frame.features.u_right.empty()) {
     frame.features.u_right[index] += shift;  // the disparity stays
   }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "backend/map/map_snapshot.h"
+#include "frontend/calibration/noise_floor.h"
 #include "frontend/matching/image_pyramid.h"
 #include "frontend/matching/patch_alignment.h"
 #include "frontend/tracking/frame.h"
@@ -50,6 +51,9 @@ class TrackRefiner {
   // positions, right coordinates and standard deviations. Returns how many.
   int refine(const MapSnapshot& map, Frame& frame) const;
 
+  // What aligned positions are off by besides; null: nothing.
+  void use_floor(std::shared_ptr<const NoiseFloor> floor) { floor_ = std::move(floor); }
+
   // In use now; see ShadingCalibrator.
   double shading() const { return shading_.depth_per_size(); }
 
@@ -69,6 +73,7 @@ class TrackRefiner {
   TrackRefinementOptions options_;
   double focal_ = 0;  // of a stereo pair [px], else 0
   ShadingCalibrator shading_;
+  std::shared_ptr<const NoiseFloor> floor_;
   std::optional<Eigen::Vector3d> learnt_at_;  // where the last frame that was looked at stood
   std::deque<std::pair<std::int64_t, std::shared_ptr<const ImagePyramid>>>
       images_;  // by frame index, ascending

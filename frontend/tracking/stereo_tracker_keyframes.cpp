@@ -1,0 +1,108 @@
+// What tracking gives to the map: keyframes, the first one, and the beginnings of components.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <variant>
+
+#include "frontend/tracking/stereo_keyframe.h"
+#include "frontend/tracking/stereo_tracker.h"
+
+namespace hybrid_slam {
+
+TrackedFrame StereoTracker::initialize(Frame& frame, const MapSnapshot& map) const {
+  TrackedFrame result;
+  result.frame_index = frame.index;
+  result.time = frame.time;
+  if (!can_carry_map(frame)) return result;
+  result.source = PoseSource::kInitialization;
+  result.keyframe = make_keyframe(frame, map, KeyframeId());
+  return result;
+}
+
+// Whether one pair shows enough to begin a map, or a component of it.
+bool StereoTracker::can_carry_map(const Frame& frame) const {
+  const auto enough = static_cast<long>(options_.min_initial_share * options_.max_features);
+  const auto& u_right = frame.features.u_right;
+  const auto with_depth =
+      std::count_if(u_right.begin(), u_right.end(), [](float u) { return !std::isnan(u); });
+  return static_cast<long>(frame.size()) >= enough && with_depth >= enough;
+}
+
+// Where the vehicle is against the map is not known: the frame gets the pose of the newest stereo
+// keyframe, as good as any, and is held there by nothing.
+void StereoTracker::begin_component(Frame& frame, const MapSnapshot& map, TrackedFrame& result) {
+  const Keyframe* const newest = map.newest_keyframe(camera_id_);
+  const auto coverage = stereo_coverage(camera_, frame, close_depth());
+  if (newest == nullptr || !coverage || !can_carry_map(frame)) return;
+  frame.landmarks.assign(frame.size(), LandmarkId());
+  frame.cam_from_world = newest->cam_from_world;
+  result.counts = {};
+  result.source = PoseSource::kInitialization;
+  result.prediction = Prediction::kNone;
+  result.reference = newest->id;
+  result.keyframe = make_stereo_keyframe(camera_id_, camera_, frame, newest->id, close_depth(),
+                                         options_.min_new_points);
+  Odometry odometry;
+  odometry.previous = newest->id;
+  odometry.motion = unknown_motion(Rigid3d());
+  uncertain_ = moved(UncertainPose::of_keyframe(camera_id_, frame.index, newest->id),
+                     odometry.motion, frame.index);
+  depth_ = coverage->median_depth;
+  result.keyframe->odometry = std::make_shared<const Odometry>(std::move(odometry));
+}
+
+void StereoTracker::learn_moving(const LadderStep& step, const Frame& frame) {
+  const Frame& last = last_.frame();
+  const auto& camera = std::get<Calibrated<RectifiedStereo>>(camera_);
+  std::vector<CircularMatch> matches = step.motion.inliers;
+  matches.insert(matches.end(), step.motion.outliers.begin(), step.motion.outliers.end());
+  moving_.add(frame.time - last.time,
+              followed_features(camera, last.features, frame.features, matches,
+                                step.motion.current_from_previous));
+}
+
+// What no map shall be made of: it moves by itself. Empty where nothing does.
+LeftOutKeypoints StereoTracker::moving(const Frame& frame) const {
+  LeftOutKeypoints left_out;
+  if (moving_.share() == 0) return left_out;
+  for (const Keypoint& keypoint : frame.features.left.keypoints) {
+    left_out.push_back(moving_.contains(keypoint.x, keypoint.y));
+  }
+  return left_out;
+}
+
+bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
+                                   const TrackedFrame& result) const {
+  const LeftOutKeypoints left_out = moving(frame);
+  const auto coverage = stereo_coverage(camera_, frame, close_depth(), left_out);
+  if (!coverage) {
+    return false;
+  }
+  KeyframeEvidence evidence;
+  evidence.inliers = result.inliers;
+  const ReferenceOverlap overlap =
+      reference_overlap(map, result.reference, camera_, frame, left_out);
+  evidence.reference_landmarks = overlap.landmarks;
+  evidence.overlap = overlap.share();
+  evidence.new_ground = overlap.new_ground();
+  evidence.close_tracked = coverage->close_tracked;
+  evidence.close_untracked = coverage->close_untracked;
+  evidence.frames_since_keyframe = static_cast<int>(frame.index - last_.keyframe_frame());
+  evidence.seconds_since_keyframe = frame.time - last_.keyframe_time();
+  evidence.keyframes = map.keyframe_count();
+  evidence.motion = result.cam_from_reference.translation().norm() / coverage->median_depth;
+  evidence.by_odometry = result.source == PoseSource::kOdometer;
+  return needs_keyframe(evidence, options_.max_features, options_.keyframes);
+}
+
+NewKeyframe StereoTracker::make_keyframe(const Frame& frame, const MapSnapshot& map,
+                                         KeyframeId reference) const {
+  NewKeyframe keyframe = make_stereo_keyframe(camera_id_, camera_, frame, reference, close_depth(),
+                                              options_.min_new_points, moving(frame));
+  const Keyframe* last = map.find_frame(camera_id_, last_.keyframe_frame());
+  if (last != nullptr) keyframe.odometry = chain_.odometry(last->id);
+  return keyframe;
+}
+
+}  // namespace hybrid_slam
