@@ -6,6 +6,7 @@
 #include <charconv>
 
 #include "apps/program/program.h"
+#include "apps/scene_renderer/condition_arguments.h"
 #include "apps/slam/parallel_for.h"
 
 namespace hybrid_slam {
@@ -17,9 +18,14 @@ constexpr const char* kFooter = R"(Writes, in the layout of UWslam:
   survey   OUT/NAME: images/<n>_{0,1}, gt_poses.txt, calibration/
   both     times.txt; gt_left_tum.txt (gt_fish_tum.txt): exact poses, world_from_cam; scene.json,
            written last: the options; frames in which the fisheye is blind or turned away
+           --arm, --dirt: masks/: 0 where the arm is seen; what the port lets through
+           --miscalibrate: true_cameras.json, the cameras that made the images
 
 Presets: easy (clear water), normal (haze, marine snow), hard (thick haze, much snow, fish, a vehicle
-that sways; hybrid: silt clouds that blind the fisheye, a wrist that turns away and back).
+that sways; hybrid: silt clouds that blind the fisheye, a wrist that turns away and back). Each of
+these has one hardship in clear water: sand (--ground sand), low-light (--photons 400 --read-noise 3
+--exposure-bias -1.5), blur (--exposure-time 0.1 --shake 1.5), silt and lamps-off (for 3 s after 2/5
+of the time), arm (--arm 30).
 The same options give the same bytes on one machine, with any number of threads.
 
 Exit codes: 0 done; 1 internal error; 2 bad usage; 3 the output folder cannot be used; 130
@@ -77,7 +83,8 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
              "hybrid (default: a hovering vehicle's stereo pair and a fisheye on its arm, 3 Hz) or "
              "survey (the stereo pair in a spiral with arms across, 5 Hz)");
   app.add_option("--sequence", line.sequence, "its name (default: the preset's, or stereo)");
-  add_choice(app, "--preset", difficulty, difficulties(), "easy, normal (default) or hard");
+  add_choice(app, "--preset", difficulty, difficulties(),
+             "easy, normal (default), hard, sand, low-light, blur, silt, lamps-off or arm");
   app.add_option("--seed", seed, "of everything random: another seafloor, another motion")
       ->capture_default_str();
   app.add_option(
@@ -97,6 +104,7 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
   app.add_option("--threads", line.threads, "that render (default: one per core)")
       ->check(CLI::Range(1, 256).description(""));
   app.add_flag("--quiet", line.quiet, "no progress, errors only");
+  ConditionArguments conditions(app);
   if (const auto end = parse_line(app, argc, argv, [&] {
         if (line.out.empty()) throw CLI::ValidationError("OUT: \"\" is no name of a folder");
         if (width && kind != SceneKind::kSurvey) {
@@ -110,14 +118,15 @@ std::optional<CommandLine> parse_command_line(int argc, char** argv, int& exit_c
           line.sequence = kind == SceneKind::kSurvey ? "stereo" : "hybrid";
         }
         check_sequence_name(line.sequence);
+        conditions.check();
       })) {
     exit_code = *end;
     return std::nullopt;
   }
-  line.options = make_scene_options(kind, difficulty, seed);
+  line.options = make_scene_options(kind, difficulty, seed, frames);
   line.options.visit = visit;
-  line.options.frames = frames.value_or(line.options.frames);
   line.options.width = width.value_or(line.options.width);
+  conditions.apply(line.options.conditions);
   if (line.threads == 0) line.threads = default_thread_count();
   return line;
 }

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
+#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "apps/io/report.h"
 #include "apps/io/trajectory.h"
-#include "apps/scene_renderer/rig_motion.h"
+#include "apps/scene_renderer/scene_json.h"
 #include "cameras/files/input_error.h"
 #include "cameras/files/output_file.h"
 #include "frontend/input/text_file.h"
@@ -16,13 +16,10 @@
 namespace hybrid_slam {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 namespace {
 
 constexpr int kJpegQuality = 95;
-constexpr double kBlindBelow = 0.15;       // CommonView::visible
-constexpr double kTurnedAwayBelow = 0.15;  // CommonView::in_view
 
 // From the scene's origin, which all cameras look at, poses would look alike whichever way they are
 // read, as world_from_cam or the inverse: the dataset's world begins elsewhere.
@@ -59,6 +56,14 @@ std::string fisheye_file(const Calibrated<KannalaBrandt>& camera) {
       camera.width, camera.height, fx, fy, cx, cy, k1, k2, k3, k4);
 }
 
+void write_encoded(const fs::path& path, const cv::Mat& pixels, const std::vector<int>& settings) {
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(path.extension().string(), pixels, bytes, settings)) {
+    throw std::logic_error("no encoder");
+  }
+  write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
 // Sequences beside each other share their calibration.
 void write_shared(const fs::path& path, const std::string& content) {
   if (fs::exists(path) && read_file(path) != content) {
@@ -75,48 +80,13 @@ std::string pose_columns(const Rigid3d& pose) {
                      q.w(), q.x(), q.y(), q.z());
 }
 
-template <typename Name>
-std::string name_of(const std::map<std::string, Name>& names, Name value) {
-  for (const auto& [name, named] : names) {
-    if (named == value) return name;
-  }
-  throw std::logic_error("an option without a name");
-}
-
-Json scene_json(const SceneSequence& sequence) {
-  const SceneOptions& options = sequence.options();
-  Json json{{"kind", name_of(scene_kinds(), options.kind)},
-            {"preset", name_of(difficulties(), options.difficulty)},
-            {"seed", options.seed},
-            {"frames", options.frames},
-            {"rate_hz", options.rate}};
-  if (options.visit > 0) json["visit"] = options.visit;
-  if (options.kind == SceneKind::kSurvey) json["width_m"] = 2 * survey_radius(options);
-  if (options.kind != SceneKind::kHybrid) return json;
-  Json blind = Json::array(), away = Json::array(), in_view = Json::array(),
-       visible = Json::array();
-  for (int i = 0; i < options.frames; ++i) {
-    const CommonView view = sequence.common_view(i);
-    if (view.in_view < kTurnedAwayBelow) {
-      away.push_back(i);
-    } else if (view.visible < kBlindBelow) {
-      blind.push_back(i);
-    }
-    in_view.push_back(std::round(1000 * view.in_view) / 1000);
-    visible.push_back(std::round(1000 * view.visible) / 1000);
-  }
-  json["fisheye"] = Json{{"blind_frames", blind},
-                         {"turned_away_frames", away},
-                         {"common_view", in_view},
-                         {"common_view_visible", visible}};
-  return json;
-}
-
 }  // namespace
 
 DatasetWriter::DatasetWriter(const fs::path& folder, const std::string& name, ImageFormat format,
                              const SceneOptions& options, const SceneCameras& cameras)
     : format_(format), hybrid_(options.kind == SceneKind::kHybrid) {
+  names_ = hybrid_ ? std::array<std::string, 3>{"_left", "_right", "_fish"}
+                   : std::array<std::string, 3>{"_0", "_1", ""};
   const fs::path parent = hybrid_ ? folder / "hybrid" : folder;
   sequence_ = parent / name;
   images_ = hybrid_ ? sequence_ / "images" / "raw" : sequence_ / "images";
@@ -137,20 +107,46 @@ void DatasetWriter::write_image(const std::string& name, const ColorImage& image
   const cv::Mat pixels(image.height, image.width, CV_8UC3,
                        const_cast<std::uint8_t*>(image.pixels.data()));  // only read
   const bool jpeg = format_ == ImageFormat::kJpeg;
-  const std::string ending = jpeg ? ".jpg" : ".png";
   const std::vector<int> settings =
       jpeg ? std::vector<int>{cv::IMWRITE_JPEG_QUALITY, kJpegQuality} : std::vector<int>{};
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(ending, pixels, bytes, settings)) throw std::logic_error("no encoder");
-  write_file(images_ / (name + ending),
-             {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  write_encoded(images_ / (name + (jpeg ? ".jpg" : ".png")), pixels, settings);
+}
+
+void DatasetWriter::write_mask(const std::string& name, const ColorImage& image,
+                               const std::vector<std::uint8_t>& arm) const {
+  if (arm.empty()) return;
+  cv::Mat mask(image.height, image.width, CV_8UC1);
+  std::transform(arm.begin(), arm.end(), mask.data,
+                 [](std::uint8_t seen) { return static_cast<std::uint8_t>(seen ? 0 : 255); });
+  write_encoded(make_folder(sequence_ / "masks") / (name + ".png"), mask, {});
+}
+
+// What the port lets through, 255 where it is clean.
+void DatasetWriter::write_dirt(const SceneSequence& sequence) const {
+  const auto& [stereo, fisheye] = sequence.cameras();
+  const auto write = [&](ViewNumber view, const std::string& name, int width, int height) {
+    const std::vector<float>& dirt = sequence.dirt(view);
+    if (dirt.empty()) return;
+    cv::Mat port(height, width, CV_8UC1);
+    std::transform(dirt.begin(), dirt.end(), port.data, [](float stopped) {
+      return static_cast<std::uint8_t>(255 * (1 - stopped) + 0.5F);
+    });
+    write_encoded(make_folder(sequence_ / "masks") / ("port" + name + ".png"), port, {});
+  };
+  write(kLeft, names_[kLeft], stereo.width, stereo.height);
+  write(kRight, names_[kRight], stereo.width, stereo.height);
+  write(kFish, names_[kFish], fisheye.width, fisheye.height);
 }
 
 void DatasetWriter::write(int frame, const RenderedFrame& images) const {
-  const std::string number = std::to_string(frame);
-  write_image(number + (hybrid_ ? "_left" : "_0"), images.left);
-  write_image(number + (hybrid_ ? "_right" : "_1"), images.right);
-  if (images.fish) write_image(number + "_fish", *images.fish);
+  const auto write = [&](ViewNumber view, const ColorImage& image) {
+    const std::string name = std::to_string(frame) + names_[view];
+    write_image(name, image);
+    write_mask(name, image, images.arm[view]);
+  };
+  write(kLeft, images.left);
+  write(kRight, images.right);
+  if (images.fish) write(kFish, *images.fish);
 }
 
 void DatasetWriter::finish(const SceneSequence& sequence) const {
@@ -174,6 +170,10 @@ void DatasetWriter::finish(const SceneSequence& sequence) const {
   write_file(sequence_ / (hybrid_ ? "camera_poses.txt" : "gt_poses.txt"), poses);
   write_tum(sequence_ / "gt_left_tum.txt", left);
   if (hybrid_) write_tum(sequence_ / "gt_fish_tum.txt", fish);
+  write_dirt(sequence);
+  if (sequence.options().conditions.miscalibration != Miscalibration{}) {
+    write_json(sequence_ / "true_cameras.json", true_cameras_json(sequence));
+  }
   write_json(sequence_ / "scene.json", scene_json(sequence));
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 
@@ -12,6 +13,7 @@ enum class ImageFormat { kJpeg, kPng };
 // Writes a sequence in UWslam's layout (docs/datasets.md):
 //   hybrid: FOLDER/hybrid/calibration, FOLDER/hybrid/NAME
 //   survey: FOLDER/NAME with a calibration of its own
+// With an arm or dirt, masks/ beside the images; with wrong cameras, true_cameras.json.
 // scene.json is written last: a sequence that has one is whole.
 class DatasetWriter {
  public:
@@ -30,10 +32,14 @@ class DatasetWriter {
 
  private:
   void write_image(const std::string& name, const ColorImage& image) const;
+  void write_mask(const std::string& name, const ColorImage& image,
+                  const std::vector<std::uint8_t>& arm) const;
+  void write_dirt(const SceneSequence& sequence) const;
 
   ImageFormat format_;
   bool hybrid_;
   std::filesystem::path sequence_, images_;
+  std::array<std::string, 3> names_;  // of each camera's images, behind their number
 };
 
 }  // namespace hybrid_slam

@@ -52,7 +52,7 @@ Color flake_radiance(const Vector3f& in_world, float distance, const Lighting& l
 
 }  // namespace
 
-void draw_snow(const SnowOptions& options, const SceneMoment& moment, const Camera& camera,
+void draw_snow(const SnowOptions& options, const SceneMoment& moment, const Lens& lens,
                const ViewRays& rays, const Rigid3d& world_from_cam, double time, std::uint32_t seed,
                RadianceImage& image) {
   const Rigid3d cam_from_world = inverse(world_from_cam);
@@ -69,8 +69,8 @@ void draw_snow(const SnowOptions& options, const SceneMoment& moment, const Came
     const Eigen::Vector3d in_cam = cam_from_world * flake.in_world.cast<double>();
     const auto distance = static_cast<float>(in_cam.norm());
     if (distance < kNearestFlake || distance > kSnowReach) return;
-    const auto place = project(camera, in_cam);
-    if (!place || !in_image(camera, *place)) return;
+    const auto place = lens.project(in_cam);
+    if (!place || !in_image(lens.calibrated(), *place)) return;
     const auto u = static_cast<float>(place->x()), v = static_cast<float>(place->y());
     const auto pixel =
         static_cast<std::size_t>(std::lround(v)) * static_cast<std::size_t>(image.width) +

@@ -3,7 +3,6 @@
 #include <cstdint>
 
 #include "apps/scene_renderer/view_renderer.h"
-#include "cameras/camera.h"
 
 // What drifts and swims in the water.
 namespace hybrid_slam {
@@ -18,7 +17,7 @@ struct SnowOptions {
 
 // Draws marine snow into an image: particles of the world at `time` [s], lit by the lamps, hidden
 // by what is nearer. Every view of one moment sees the same particles.
-void draw_snow(const SnowOptions& options, const SceneMoment& moment, const Camera& camera,
+void draw_snow(const SnowOptions& options, const SceneMoment& moment, const Lens& lens,
                const ViewRays& rays, const Rigid3d& world_from_cam, double time, std::uint32_t seed,
                RadianceImage& image);
 

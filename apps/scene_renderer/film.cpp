@@ -5,6 +5,7 @@
 
 #include "apps/scene_renderer/noise.h"
 #include "apps/scene_renderer/rows.h"
+#include "apps/scene_renderer/shot_noise.h"
 
 namespace hybrid_slam {
 namespace {
@@ -61,6 +62,13 @@ float noise_of(std::uint32_t bits) {
   return (static_cast<float>(sum) - 510) / 147.8F;
 }
 
+// A share of full scale as so many electrons make it.
+float counted(float linear, const FilmOptions& options, std::uint32_t bits) {
+  const float electrons =
+      poisson(options.photons * linear, bits) + options.read_noise * gaussian(~bits);
+  return std::clamp(electrons / options.photons, 0.0F, 1.0F);
+}
+
 std::vector<float> make_gamma() {  // of 0 to 1 in 4096 steps, in grey levels
   std::vector<float> gamma(4097);
   for (std::size_t i = 0; i < gamma.size(); ++i) {
@@ -97,8 +105,12 @@ ColorImage develop(const RadianceImage& image, const ViewRays& rays, float expos
       if (!rays.sees(pixel)) continue;
       const float factor = exposure * lens_at(rays, x, y, options.vignetting);
       for (std::size_t channel = 0; channel < 3; ++channel) {
-        const float linear =
-            std::clamp(factor * light[pixel][2 - static_cast<int>(channel)], 0.0F, 1.0F);
+        const float full = factor * light[pixel][2 - static_cast<int>(channel)];
+        float linear = std::clamp(full, 0.0F, 1.0F);
+        if (options.photons > 0) {
+          linear = counted(std::max(full, 0.0F), options,
+                           mixed_bits(x, y, static_cast<int>(channel) + 20, seed));
+        }
         const std::uint32_t bits = mixed_bits(x, y, static_cast<int>(channel) + 10, seed);
         const float grey =
             gamma[static_cast<std::size_t>(4096 * linear)] + options.noise * noise_of(bits);

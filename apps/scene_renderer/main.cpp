@@ -13,19 +13,19 @@ int run(const CommandLine& line) {
   const SceneSequence sequence(line.options, cameras, line.threads);
   if (!line.quiet) {
     spdlog::info("{}: {} frames of {}x{}, {} triangles", writer.sequence_folder().string(),
-                 line.options.frames, line.width, line.height,
+                 sequence.motion().size(), line.width, line.height,
                  sequence.seafloor().mesh().triangles.size());
   }
   ProgressLine progress("frames", line.quiet);
-  for (int frame = 0; frame < line.options.frames; ++frame) {
+  const int frames = static_cast<int>(sequence.motion().size());
+  for (int frame = 0; frame < frames; ++frame) {
     if (interrupted()) {
       progress.finish();
       spdlog::warn("interrupted after {} frames", frame);
       return kExitInterrupted;
     }
     writer.write(frame, sequence.render(frame));
-    progress.update(static_cast<std::size_t>(frame) + 1,
-                    static_cast<std::size_t>(line.options.frames), "");
+    progress.update(static_cast<std::size_t>(frame) + 1, static_cast<std::size_t>(frames), "");
   }
   writer.finish(sequence);
   progress.finish();

@@ -8,7 +8,7 @@
 
 namespace hybrid_slam {
 
-enum class Material : std::uint8_t { kGround, kRock, kFish };
+enum class Material : std::uint8_t { kGround, kRock, kFish, kSand, kArm };
 
 using Triangle = std::array<std::uint32_t, 3>;  // vertices, counterclockwise from outside
 

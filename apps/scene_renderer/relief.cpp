@@ -29,8 +29,10 @@ float height_at(float x, float y, const ReliefOptions& options, std::uint32_t se
   const float broken = smooth_step(-0.1F, 0.4F, gradient_noise(p / 1.7F, seed + 4).value);
   const float ledges = 0.35F * crests(q, 0.8F, seed + 5) + 0.12F * crests(q, 0.23F, seed + 6);
   const float distance2 = (x * x + y * y) / (0.9F * 0.9F);
-  return options.roughness * (waves + 0.5F * broken * ledges) +
-         options.mound_height * std::exp(-distance2);
+  const float height = options.roughness * (waves + 0.5F * broken * ledges) +
+                       options.mound_height * std::exp(-distance2);
+  if (options.ripple_height == 0) return height;
+  return height + options.ripple_height * ripple_at(x, y, options, seed);
 }
 
 // Moves a point by noise in three dimensions, which lets steep ground hang over.
@@ -43,6 +45,7 @@ Vector3f pushed(const Vector3f& p, float strength, float wavelength, std::uint32
 TriangleMesh make_ground(const ReliefOptions& options, std::uint32_t seed, int threads) {
   TriangleMesh mesh;
   const int n = options.grid;
+  const bool is_sand = options.ripple_height > 0;
   // Cells grow outwards: position = inner * t in the middle, half_size at t = 1.
   const auto spread = [&](int i) {
     const float t = 2 * static_cast<float>(i) / static_cast<float>(n - 1) - 1;
@@ -55,7 +58,7 @@ TriangleMesh make_ground(const ReliefOptions& options, std::uint32_t seed, int t
       const float x = spread(column), y = spread(row);
       const Vector3f flat(x, y, height_at(x, y, options, seed));
       mesh.vertices[static_cast<std::size_t>(row * n + column)] =
-          pushed(flat, 0.2F, 0.4F, seed + 10);
+          is_sand ? flat : pushed(flat, 0.2F, 0.4F, seed + 10);
     }
   });
   for (int row = 0; row + 1 < n; ++row) {
@@ -66,7 +69,7 @@ TriangleMesh make_ground(const ReliefOptions& options, std::uint32_t seed, int t
       mesh.triangles.push_back({a, d, c});
     }
   }
-  mesh.materials.assign(mesh.triangles.size(), Material::kGround);
+  mesh.materials.assign(mesh.triangles.size(), is_sand ? Material::kSand : Material::kGround);
   mesh.seeds.assign(mesh.triangles.size(), seed);
   set_vertex_normals(mesh);
   return mesh;
@@ -149,6 +152,15 @@ TriangleMesh make_boulder(int number, const ReliefOptions& options, std::uint32_
 }
 
 }  // namespace
+
+float ripple_at(float x, float y, const ReliefOptions& options, std::uint32_t seed) {
+  const Vector3f p(x, y, 0);
+  const float winding = 0.5F * gradient_noise(p / 1.1F, seed + 30).value +
+                        0.15F * gradient_noise(p / 0.35F, seed + 31).value;
+  const float phase = x / options.ripple_length + winding;
+  const float wave = std::sin(2 * std::numbers::pi_v<float> * phase);
+  return 0.5F + 0.5F * wave + 0.15F * (wave * wave - 1);  // crests narrower than troughs
+}
 
 TriangleMesh make_seafloor(const ReliefOptions& options, std::uint32_t seed, int threads) {
   TriangleMesh floor = make_ground(options, seed, threads);

@@ -20,6 +20,7 @@ constexpr double kTurnSteps = 100.0 / 11;  // steps between two turns of the spi
 constexpr double kSpiralShare = 0.65;      // of the path's length; the rest are arms across
 constexpr double kSurveyAltitude = 1.5;    // [m]
 constexpr double kVisitShare = 0.75;       // of the radius: beyond, the first spiral has gaps
+constexpr double kShakePeriod = 0.7;       // [s]
 constexpr double kLeastClearance = 0.3;    // [m] of the wrist above the ground
 const Vector3d kSceneMiddle(0, 0, 0.2);    // what the hovering vehicle looks at
 
@@ -47,6 +48,14 @@ Rigid3d look_at(const Vector3d& position, const Vector3d& target, const Vector3d
   return {Eigen::Quaterniond(axes), position};
 }
 
+// The vehicle shaken by its thrusters, or by who carries it.
+void shake(const SceneOptions& options, double time, Rigid3d& pose) {
+  if (options.conditions.shake == 0) return;
+  const double most = kPi / 180 * options.conditions.shake;
+  pose.rotation() =
+      (pose.rotation() * so3_exp(most * wander3(options, 30, kShakePeriod, time))).normalized();
+}
+
 // Between the cameras of the stereo pair.
 Rigid3d hovering_vehicle(const SceneOptions& options, double time) {
   const Vector3d slow = wander3(options, 0, 45, time);
@@ -56,7 +65,16 @@ Rigid3d hovering_vehicle(const SceneOptions& options, double time) {
       options.sway * (0.02 * wander3(options, 6, 7, time) + 0.02 * wander3(options, 9, 30, time));
   Rigid3d pose = look_at(position, kSceneMiddle, Vector3d::UnitZ());
   pose.rotation() = (pose.rotation() * so3_exp(turn)).normalized();
+  shake(options, time, pose);
   return pose;
+}
+
+// A hand that works ahead of the vehicle: a survey's arm has no camera.
+Rigid3d working_hand(const SceneOptions& options, const Rigid3d& world_from_vehicle, double time) {
+  const Vector3d place(-0.1 + 0.2 * wander(options, 40, 11, time),
+                       -0.05 + 0.1 * wander(options, 41, 13, time),
+                       0.85 + 0.12 * wander(options, 42, 17, time));
+  return {world_from_vehicle.rotation(), world_from_vehicle * place};
 }
 
 Rigid3d wrist_pose(const SceneOptions& options, const Rigid3d& world_from_vehicle, double time,
@@ -107,25 +125,6 @@ double lift_needed(const std::vector<RigMoment>& moments, const RayCaster& seafl
     }
   }
   return lift;
-}
-
-std::vector<RigMoment> hybrid_motion(const SceneOptions& options, const RayCaster& seafloor) {
-  std::vector<RigMoment> moments;
-  const double end = options.frames / options.rate;
-  for (int i = 0; i < options.frames; ++i) {
-    RigMoment moment;
-    moment.time = i / options.rate;
-    const Rigid3d vehicle = hovering_vehicle(options, moment.time);
-    const double away = away_at(options, moment.time, end);
-    moment.world_from_left = {vehicle.rotation(), vehicle * Vector3d(-kHalfBaseline, 0, 0)};
-    moment.world_from_fish = wrist_pose(options, vehicle, moment.time, away);
-    moment.turned_away = away > 0.5;
-    moment.silt = static_cast<float>(silt_strength(options, moment.time, end));
-    moments.push_back(moment);
-  }
-  const double lift = lift_needed(moments, seafloor);
-  for (RigMoment& moment : moments) moment.world_from_fish->translation().z() += lift;
-  return moments;
 }
 
 // Way from frame to frame [m]: turns of a spiral kTurnSteps steps apart, of kSpiralShare of all
@@ -191,9 +190,12 @@ std::vector<Eigen::Vector2d> placed_path(const SceneOptions& options, double ste
   return path;
 }
 
-std::vector<RigMoment> survey_motion(const SceneOptions& options) {
-  const double step = survey_step(options);
-  const std::vector<Eigen::Vector2d> path = placed_path(options, step);
+// Where a survey's path is and which way it goes.
+struct PathPoint {
+  Eigen::Vector2d place, ahead;
+};
+
+PathPoint path_point(const std::vector<Eigen::Vector2d>& path, std::ptrdiff_t at) {
   const auto mean_over = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
     const auto last = static_cast<std::ptrdiff_t>(path.size()) - 1;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -202,24 +204,24 @@ std::vector<RigMoment> survey_motion(const SceneOptions& options) {
     }
     return Eigen::Vector2d(sum / static_cast<double>(to - from + 1));
   };
-  std::vector<RigMoment> moments;
-  for (int i = 0; i < options.frames; ++i) {
-    RigMoment moment;
-    moment.time = i / options.rate;
-    const auto at = static_cast<std::ptrdiff_t>(std::lround(100 * step * i));
-    const Eigen::Vector2d place = mean_over(at - 20, at + 20);  // rounds the corners
-    const Eigen::Vector2d ahead = mean_over(at, at + 60) - mean_over(at - 60, at);
-    const Vector3d sway = options.sway * wander3(options, 3, 9, moment.time);
-    const Vector3d position(place.x() + 0.02 * sway.x(), place.y() + 0.02 * sway.y(),
-                            kSurveyAltitude + 0.06 * sway.z());
-    Rigid3d pose =
-        look_at(position, position - Vector3d::UnitZ(), Vector3d(ahead.x(), ahead.y(), 0));
-    const Vector3d turn = 0.03 * options.sway * wander3(options, 6, 7, moment.time);
-    pose.rotation() = (pose.rotation() * so3_exp(turn)).normalized();
-    moment.world_from_left = {pose.rotation(), pose * Vector3d(-kHalfBaseline, 0, 0)};
-    moments.push_back(moment);
-  }
-  return moments;
+  const Eigen::Vector2d place = mean_over(at - 20, at + 20);  // rounds the corners
+  return {place, mean_over(at, at + 60) - mean_over(at - 60, at)};
+}
+
+// At `frames` frames from the beginning: at a whole number on one of the path's points, between on
+// the straight line from one point to the next.
+PathPoint path_point_after(const std::vector<Eigen::Vector2d>& path, double step, double frames) {
+  const auto point_of = [&](double frame) { return std::lround(100 * step * frame); };
+  const double nearest = std::round(frames);
+  if (std::abs(frames - nearest) < 1e-9) return path_point(path, point_of(nearest));
+  const double before = std::floor(frames);
+  const auto from = static_cast<double>(point_of(before));
+  const auto to = static_cast<double>(point_of(before + 1));
+  const double exact = from + (frames - before) * (to - from);
+  const auto first = static_cast<std::ptrdiff_t>(std::floor(exact));
+  const double share = exact - static_cast<double>(first);
+  const PathPoint a = path_point(path, first), b = path_point(path, first + 1);
+  return {a.place + share * (b.place - a.place), a.ahead + share * (b.ahead - a.ahead)};
 }
 
 }  // namespace
@@ -230,9 +232,63 @@ double survey_radius(const SceneOptions& options) {
   return std::max(0.4, std::sqrt(spiral * kTurnSteps * kSurveyStep / kPi));
 }
 
+RigMotion::RigMotion(const SceneOptions& options, const RayCaster& seafloor) : options_(options) {
+  if (options.kind == SceneKind::kSurvey) {
+    step_ = survey_step(options);
+    path_ = placed_path(options, step_);
+    return;
+  }
+  std::vector<RigMoment> moments;
+  for (int i = 0; i < options.frames; ++i) moments.push_back(hybrid_at(i / options.rate));
+  lift_ = lift_needed(moments, seafloor);
+}
+
+RigMoment RigMotion::at(double time) const {
+  RigMoment moment = options_.kind == SceneKind::kHybrid ? hybrid_at(time) : survey_at(time);
+  moment.number = static_cast<int>(std::lround(time * options_.rate));
+  return moment;
+}
+
+RigMoment RigMotion::hybrid_at(double time) const {
+  const double end = options_.frames / options_.rate;
+  RigMoment moment;
+  moment.time = time;
+  const Rigid3d vehicle = hovering_vehicle(options_, time);
+  const double away = away_at(options_, time, end);
+  moment.world_from_left = {vehicle.rotation(), vehicle * Vector3d(-kHalfBaseline, 0, 0)};
+  Rigid3d wrist = wrist_pose(options_, vehicle, time, away);
+  wrist.translation().z() += lift_;
+  moment.world_from_fish = wrist;
+  moment.world_from_hand = wrist;
+  moment.turned_away = away > 0.5;
+  moment.silt = static_cast<float>(silt_strength(options_, time, end));
+  return moment;
+}
+
+RigMoment RigMotion::survey_at(double time) const {
+  RigMoment moment;
+  moment.time = time;
+  const auto [place, ahead] = path_point_after(path_, step_, time * options_.rate);
+  const Vector3d sway = options_.sway * wander3(options_, 3, 9, time);
+  const Vector3d position(place.x() + 0.02 * sway.x(), place.y() + 0.02 * sway.y(),
+                          kSurveyAltitude + 0.06 * sway.z());
+  Rigid3d pose = look_at(position, position - Vector3d::UnitZ(), Vector3d(ahead.x(), ahead.y(), 0));
+  const Vector3d turn = 0.03 * options_.sway * wander3(options_, 6, 7, time);
+  pose.rotation() = (pose.rotation() * so3_exp(turn)).normalized();
+  shake(options_, time, pose);
+  moment.world_from_left = {pose.rotation(), pose * Vector3d(-kHalfBaseline, 0, 0)};
+  moment.world_from_hand = working_hand(options_, pose, time);
+  return moment;
+}
+
 std::vector<RigMoment> make_motion(const SceneOptions& options, const RayCaster& seafloor) {
-  return options.kind == SceneKind::kHybrid ? hybrid_motion(options, seafloor)
-                                            : survey_motion(options);
+  const RigMotion motion(options, seafloor);
+  std::vector<RigMoment> moments;
+  for (const FrameFate& fate :
+       frame_fates(options.conditions, options.frames, visit_seed(options))) {
+    moments.push_back(motion.at(fate.moment / options.rate));
+  }
+  return moments;
 }
 
 }  // namespace hybrid_slam

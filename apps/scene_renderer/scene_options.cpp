@@ -1,9 +1,13 @@
 #include "apps/scene_renderer/scene_options.h"
 
+#include <cmath>
+
 #include "apps/scene_renderer/noise.h"
 
 namespace hybrid_slam {
 namespace {
+
+constexpr double kSpellLength = 3;  // [s] of the presets' silt and darkness
 
 // Clear water, nothing in it.
 void make_easy(SceneOptions& options) {
@@ -28,6 +32,37 @@ void make_hard(SceneOptions& options) {
   options.turned_away = options.kind == SceneKind::kHybrid;
 }
 
+// One hardship each, in the water of the preset easy.
+void make_condition(SceneOptions& options) {
+  Conditions& conditions = options.conditions;
+  const Spell spell{std::round(0.4 * options.frames / options.rate), kSpellLength};
+  switch (options.difficulty) {
+    case Difficulty::kSand:
+      conditions.ground = Ground::kSand;
+      break;
+    case Difficulty::kLowLight:
+      conditions.photons = 400;
+      conditions.read_noise = 3;
+      conditions.exposure_bias = -1.5;
+      break;
+    case Difficulty::kBlur:
+      conditions.exposure_time = 0.1;
+      conditions.shake = 1.5;
+      break;
+    case Difficulty::kSilt:
+      conditions.silt = {spell};
+      break;
+    case Difficulty::kLampsOff:
+      conditions.lamps_off = {spell};
+      break;
+    case Difficulty::kArm:
+      conditions.arm = 30;
+      break;
+    default:
+      break;
+  }
+}
+
 }  // namespace
 
 const std::map<std::string, SceneKind>& scene_kinds() {
@@ -37,20 +72,32 @@ const std::map<std::string, SceneKind>& scene_kinds() {
 }
 
 const std::map<std::string, Difficulty>& difficulties() {
-  static const std::map<std::string, Difficulty> names{
-      {"easy", Difficulty::kEasy}, {"normal", Difficulty::kNormal}, {"hard", Difficulty::kHard}};
+  static const std::map<std::string, Difficulty> names{{"easy", Difficulty::kEasy},
+                                                       {"normal", Difficulty::kNormal},
+                                                       {"hard", Difficulty::kHard},
+                                                       {"sand", Difficulty::kSand},
+                                                       {"low-light", Difficulty::kLowLight},
+                                                       {"blur", Difficulty::kBlur},
+                                                       {"silt", Difficulty::kSilt},
+                                                       {"lamps-off", Difficulty::kLampsOff},
+                                                       {"arm", Difficulty::kArm}};
   return names;
 }
 
-SceneOptions make_scene_options(SceneKind kind, Difficulty difficulty, std::uint32_t seed) {
+SceneOptions make_scene_options(SceneKind kind, Difficulty difficulty, std::uint32_t seed,
+                                std::optional<int> frames) {
   SceneOptions options;
   options.kind = kind;
   options.difficulty = difficulty;
   options.seed = seed;
-  options.frames = kind == SceneKind::kHybrid ? 120 : 400;
+  options.frames = frames.value_or(kind == SceneKind::kHybrid ? 120 : 400);
   options.rate = kind == SceneKind::kHybrid ? 3 : 5;
-  if (difficulty == Difficulty::kEasy) make_easy(options);
-  if (difficulty == Difficulty::kHard) make_hard(options);
+  if (difficulty == Difficulty::kHard) {
+    make_hard(options);
+  } else if (difficulty != Difficulty::kNormal) {
+    make_easy(options);
+    make_condition(options);
+  }
   return options;
 }
 

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
+#include "apps/scene_renderer/conditions.h"
 #include "apps/scene_renderer/drifting.h"
 #include "apps/scene_renderer/film.h"
 #include "apps/scene_renderer/water.h"
@@ -12,7 +14,7 @@
 namespace hybrid_slam {
 
 enum class SceneKind { kHybrid, kSurvey };
-enum class Difficulty { kEasy, kNormal, kHard };
+enum class Difficulty { kEasy, kNormal, kHard, kSand, kLowLight, kBlur, kSilt, kLampsOff, kArm };
 
 // What is rendered, and how hard it is made. Equal options give equal bytes.
 struct SceneOptions {
@@ -34,13 +36,16 @@ struct SceneOptions {
   double sway = 1;             // of the vehicle, times some centimetres and degrees
   bool silt_episodes = false;  // clouds that blind the fisheye for seconds
   bool turned_away = false;    // times when the wrist looks away from the ground
+  Conditions conditions;
 };
 
 const std::map<std::string, SceneKind>& scene_kinds();
 const std::map<std::string, Difficulty>& difficulties();
 
-// The options of a preset, with the kind's number of frames and rate.
-SceneOptions make_scene_options(SceneKind kind, Difficulty difficulty, std::uint32_t seed);
+// The options of a preset, with the kind's number of frames and rate. `frames`: another number of
+// them; a preset's spells lie at a share of the whole.
+SceneOptions make_scene_options(SceneKind kind, Difficulty difficulty, std::uint32_t seed,
+                                std::optional<int> frames = {});
 
 // Seed of what is another one at each visit; of visit 0 it is `seed`.
 std::uint32_t visit_seed(const SceneOptions& options);

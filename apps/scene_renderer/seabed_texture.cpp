@@ -133,6 +133,28 @@ SurfaceLook rock_look(const SurfacePoint& point) {
   return look;
 }
 
+// Fine grains, faint patches, and here and there a shell: little to hold on to.
+SurfaceLook sand_look(const SurfacePoint& point) {
+  const Vector3f& p = point.position;
+  const NoiseSample detail = octave_noise(p, {0.03F, 0.0015F, 0.95F}, point.footprint, point.seed);
+  const NoiseSample tone = octave_noise(p, {0.9F, 0.09F, 0.6F}, point.footprint, point.seed + 40);
+  SurfaceLook look;
+  look.albedo = kSand * std::exp(0.3F * detail.value + 0.15F * tone.value);
+  look.normal = tilted(point.normal, detail.gradient, 0.05F);
+  add_pebbles(point, point.seed + 80, 24, look);
+  return look;
+}
+
+// Dark yellow, black and grey paint, patch by patch (a pale arm so near to the lamps would make the
+// camera underexpose the ground): the patches go with the arm, as noise would not.
+SurfaceLook arm_look(const SurfacePoint& point) {
+  const float kind = unit_interval(point.seed);
+  const Color paint = kind < 0.45F  ? Color(0.22F, 0.15F, 0.02F)
+                      : kind < 0.7F ? Color(0.02F, 0.02F, 0.02F)
+                                    : Color(0.09F, 0.09F, 0.09F);
+  return {paint, point.normal};
+}
+
 // Dark backs and silver bellies, by the way the skin faces: fish move through the noise.
 SurfaceLook fish_look(const SurfacePoint& point) {
   const Color back(0.12F, 0.14F, 0.15F), belly(0.62F, 0.62F, 0.58F);
@@ -144,6 +166,8 @@ SurfaceLook fish_look(const SurfacePoint& point) {
 SurfaceLook look_of(const SurfacePoint& point) {
   SurfaceLook look = point.material == Material::kGround ? ground_look(point)
                      : point.material == Material::kRock ? rock_look(point)
+                     : point.material == Material::kSand ? sand_look(point)
+                     : point.material == Material::kArm  ? arm_look(point)
                                                          : fish_look(point);
   look.albedo = look.albedo.max(0.01F).min(0.9F);
   return look;

@@ -7,55 +7,57 @@
 namespace hybrid_slam {
 namespace {
 
-std::optional<Eigen::Vector3d> bearing_within(const Camera& camera, double u, double v,
-                                              double max_angle) {
-  const auto bearing = unproject(camera, {u, v});
-  if (!bearing || std::atan2(bearing->head<2>().norm(), bearing->z()) > max_angle) {
+std::optional<LensRay> ray_within(const Lens& lens, double u, double v, double max_angle) {
+  const auto ray = lens.unproject({u, v});
+  if (!ray || std::atan2(ray->bearing.head<2>().norm(), ray->bearing.z()) > max_angle) {
     return std::nullopt;
   }
-  return bearing;
+  return ray;
 }
 
 // Comes in from a pixel without a ray towards the middle until there is one.
-Eigen::Vector3d nearest_bearing(const Camera& camera, double u, double v) {
-  const double middle_u = 0.5 * image_width(camera), middle_v = 0.5 * image_height(camera);
+Eigen::Vector3d nearest_bearing(const Lens& lens, double u, double v) {
+  const double middle_u = 0.5 * image_width(lens.calibrated()),
+               middle_v = 0.5 * image_height(lens.calibrated());
   for (double share = 1; share > 0; share -= 0.02) {
-    const auto bearing =
-        unproject(camera, {middle_u + share * (u - middle_u), middle_v + share * (v - middle_v)});
-    if (bearing) return *bearing;
+    const auto ray =
+        lens.unproject({middle_u + share * (u - middle_u), middle_v + share * (v - middle_v)});
+    if (ray) return ray->bearing;
   }
   return Eigen::Vector3d::UnitZ();
 }
 
 }  // namespace
 
-ViewRays make_view_rays(const Camera& camera, double max_angle, int threads) {
+ViewRays make_view_rays(const Lens& lens, double max_angle, int threads) {
   ViewRays rays;
-  rays.width = image_width(camera);
-  rays.height = image_height(camera);
+  rays.width = image_width(lens.calibrated());
+  rays.height = image_height(lens.calibrated());
   const auto count = static_cast<std::size_t>(rays.width) * static_cast<std::size_t>(rays.height);
   rays.bearing.assign(count, Eigen::Vector3f::Zero());
   rays.right = rays.bearing;
   rays.down = rays.bearing;
+  if (lens.has_port()) rays.shift.assign(count, 0);
   for_rows(rays.height, threads, [&](int y) {
     auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(rays.width);
     for (int x = 0; x < rays.width; ++x, ++pixel) {
-      const auto centre = bearing_within(camera, x, y, max_angle);
-      const auto left = unproject(camera, {x - 0.5, y});
-      const auto right = unproject(camera, {x + 0.5, y});
-      const auto up = unproject(camera, {x, y - 0.5});
-      const auto down = unproject(camera, {x, y + 0.5});
+      const auto centre = ray_within(lens, x, y, max_angle);
+      const auto left = lens.unproject({x - 0.5, y});
+      const auto right = lens.unproject({x + 0.5, y});
+      const auto up = lens.unproject({x, y - 0.5});
+      const auto down = lens.unproject({x, y + 0.5});
       if (!centre || !left || !right || !up || !down) continue;
-      rays.bearing[pixel] = centre->cast<float>();
-      rays.right[pixel] = (*right - *left).cast<float>();
-      rays.down[pixel] = (*down - *up).cast<float>();
+      rays.bearing[pixel] = centre->bearing.cast<float>();
+      rays.right[pixel] = (right->bearing - left->bearing).cast<float>();
+      rays.down[pixel] = (down->bearing - up->bearing).cast<float>();
+      if (lens.has_port()) rays.shift[pixel] = static_cast<float>(centre->shift);
     }
   });
   rays.node_columns = (rays.width - 1) / kHazeCell + 2;
   rays.node_rows = (rays.height - 1) / kHazeCell + 2;
   for (int row = 0; row < rays.node_rows; ++row) {
     for (int column = 0; column < rays.node_columns; ++column) {
-      const Eigen::Vector3d bearing = nearest_bearing(camera, column * kHazeCell, row * kHazeCell);
+      const Eigen::Vector3d bearing = nearest_bearing(lens, column * kHazeCell, row * kHazeCell);
       rays.node_bearing.push_back(bearing.cast<float>());
     }
   }

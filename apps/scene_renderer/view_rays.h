@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "cameras/camera.h"
+#include "apps/scene_renderer/lens.h"
 
 namespace hybrid_slam {
 
@@ -17,6 +17,8 @@ struct ViewRays {
   // Unit bearing of each pixel's centre and how it changes per pixel to the right and down (central
   // differences over one pixel: exact within it to 0.004 px). Zero outside the field of view.
   std::vector<Eigen::Vector3f> bearing, right, down;
+  // Where each ray cuts the camera's axis [m]; empty if all do so in the camera's centre.
+  std::vector<float> shift;
 
   // Bearings at every kHazeCell-th pixel, from (0, 0) to beyond the last; of the nearest pixel
   // that has one where the model has none.
@@ -29,6 +31,6 @@ struct ViewRays {
 
 // `max_angle`: half the field of view [rad]; pixels whose ray lies beyond see nothing. The first
 // image of a stereo pair is meant (RectifiedStereo: the left one).
-ViewRays make_view_rays(const Camera& camera, double max_angle, int threads);
+ViewRays make_view_rays(const Lens& lens, double max_angle, int threads);
 
 }  // namespace hybrid_slam

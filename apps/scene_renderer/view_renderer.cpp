@@ -40,33 +40,51 @@ class RowRenderer {
         rotation_(world_from_cam.rotation().toRotationMatrix().cast<float>()),
         seed_(seed) {}
 
+  // Whether the view may show an arm.
+  bool has_arm() const {
+    if (moment_.movers == nullptr) return false;
+    const auto& materials = moment_.movers->mesh().materials;
+    return std::find(materials.begin(), materials.end(), Material::kArm) != materials.end();
+  }
+
   void render(int y, RadianceImage& image) const {
     auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(rays_.width);
     for (int x = 0; x < rays_.width; ++x, ++pixel) {
       image.pixels[pixel] = Color::Zero();
       image.distance[pixel] = kInfinity;
       if (rays_.sees(pixel)) {
-        image.pixels[pixel] = render_pixel(x, y, pixel, image.distance[pixel]);
+        image.pixels[pixel] = render_pixel(x, y, pixel, image);
       }
     }
   }
 
  private:
-  Color render_pixel(int x, int y, std::size_t pixel, float& nearest) const {
-    const Samples samples = cast(x, y, pixel);
+  Color render_pixel(int x, int y, std::size_t pixel, RadianceImage& image) const {
+    const Vector3f origin = origin_of(pixel);
+    const Samples samples = cast(x, y, pixel, origin);
+    float& nearest = image.distance[pixel];
     for (const Sample& sample : samples) {
-      if (sample.hit) nearest = std::min(nearest, sample.hit->distance);
+      if (!sample.hit) continue;
+      nearest = std::min(nearest, sample.hit->distance);
+      if (sample.material() == Material::kArm) image.arm[pixel] = 1;
     }
     const float angle = rays_.right[pixel].norm();
     const auto u = static_cast<float>(x), v = static_cast<float>(y);
     const std::uint32_t bits = mixed_bits(x, y, 1, seed_);
-    if (is_one_surface(samples, angle)) return shade(mean_of(samples), u, v, angle, bits);
+    if (is_one_surface(samples, angle)) {
+      return shade(mean_of(samples), origin, u, v, angle, bits);
+    }
     Color sum = Color::Zero();
-    for (const Sample& sample : samples) sum += shade(sample, u, v, angle, bits);
+    for (const Sample& sample : samples) sum += shade(sample, origin, u, v, angle, bits);
     return sum / kPacket;
   }
 
-  Samples cast(int x, int y, std::size_t pixel) const {
+  Vector3f origin_of(std::size_t pixel) const {
+    if (rays_.shift.empty()) return origin_;
+    return origin_ + rays_.shift[pixel] * rotation_.col(2);
+  }
+
+  Samples cast(int x, int y, std::size_t pixel, const Vector3f& origin) const {
     const std::uint32_t bits = mixed_bits(x, y, 0, seed_);
     const auto part = [&](int i) {  // in [0, 0.5): one place in each quarter of the pixel
       return static_cast<float>((bits >> (8 * i)) & 255U) * (0.5F / 256);
@@ -79,16 +97,16 @@ class RowRenderer {
                                places[i][1] * rays_.down[pixel];
       directions[i] = (rotation_ * bearing).normalized();
     }
-    const auto hits = moment_.seafloor->cast(origin_, directions);
+    const auto hits = moment_.seafloor->cast(origin, directions);
     Samples samples;
     for (std::size_t i = 0; i < kPacket; ++i) {
       samples[i] = {directions[i], hits[i], &moment_.seafloor->mesh()};
     }
-    if (moment_.fish != nullptr) {
-      const auto fish = moment_.fish->cast(origin_, directions);
+    if (moment_.movers != nullptr) {
+      const auto movers = moment_.movers->cast(origin, directions);
       for (std::size_t i = 0; i < kPacket; ++i) {
-        if (fish[i] && (!hits[i] || fish[i]->distance < hits[i]->distance)) {
-          samples[i] = {directions[i], fish[i], &moment_.fish->mesh()};
+        if (movers[i] && (!hits[i] || movers[i]->distance < hits[i]->distance)) {
+          samples[i] = {directions[i], movers[i], &moment_.movers->mesh()};
         }
       }
     }
@@ -125,12 +143,13 @@ class RowRenderer {
   }
 
   // What comes into the lens from a sample's direction.
-  Color shade(const Sample& sample, float u, float v, float pixel_angle, std::uint32_t bits) const {
+  Color shade(const Sample& sample, const Vector3f& origin, float u, float v, float pixel_angle,
+              std::uint32_t bits) const {
     if (!sample.hit) return haze_.at(u, v, kInfinity).inscatter;
     const HazeSample haze = haze_.at(u, v, sample.hit->distance);
     if (haze.transmittance.maxCoeff() < 0.003F) return haze.inscatter;
     SurfacePoint point;
-    point.position = origin_ + sample.hit->distance * sample.direction;
+    point.position = origin + sample.hit->distance * sample.direction;
     point.normal = sample.hit->normal;
     point.material = sample.material();
     point.seed = sample.seed();
@@ -163,7 +182,7 @@ class RowRenderer {
     const Vector3f target = lamp.position + 2 * lamp.radius * jitter;
     const Vector3f start = point.position + 0.5F * kShadowMargin * point.normal;
     return moment_.seafloor->is_blocked(start, target, kShadowMargin) ||
-           (moment_.fish != nullptr && moment_.fish->is_blocked(start, target, kShadowMargin));
+           (moment_.movers != nullptr && moment_.movers->is_blocked(start, target, kShadowMargin));
   }
 
   const SceneMoment& moment_;
@@ -178,11 +197,12 @@ class RowRenderer {
 
 RadianceImage render_view(const SceneMoment& moment, const ViewRays& rays,
                           const Rigid3d& world_from_cam, std::uint32_t seed, int threads) {
-  RadianceImage image{rays.width, rays.height, {}, {}};
+  RadianceImage image{rays.width, rays.height, {}, {}, {}};
   image.pixels.resize(rays.bearing.size());
   image.distance.resize(rays.bearing.size());
   const Haze haze(moment.lighting, rays, world_from_cam, threads);
   const RowRenderer rows(moment, rays, haze, world_from_cam, seed);
+  if (rows.has_arm()) image.arm.assign(rays.bearing.size(), 0);
   for_rows(rays.height, threads, [&](int y) { rows.render(y, image); });
   return image;
 }

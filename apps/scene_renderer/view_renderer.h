@@ -11,7 +11,7 @@ namespace hybrid_slam {
 // What the cameras look at at one moment.
 struct SceneMoment {
   const RayCaster* seafloor = nullptr;
-  const RayCaster* fish = nullptr;  // null: none about
+  const RayCaster* movers = nullptr;  // fish and the arm; null: none about
   Lighting lighting;
 };
 
@@ -20,8 +20,9 @@ struct RadianceImage {
   int width = 0;
   int height = 0;
   std::vector<Color> pixels;
-  std::vector<float> distance;  // [m] to the nearest surface; infinity where there is none, or
-                                // outside the field of view
+  std::vector<float> distance;    // [m] to the nearest surface; infinity where there is none, or
+                                  // outside the field of view
+  std::vector<std::uint8_t> arm;  // 1 where any of a pixel's rays meets the arm; empty if none does
 };
 
 // Renders one view: four rays per pixel in two pairs that are symmetric about its centre, so that
