@@ -5,10 +5,11 @@
 #include <vector>
 
 #include "apps/feature_eval/feature_method.h"
+#include "apps/feature_eval/study/study.h"
 
 namespace hybrid_slam {
 
-enum class EvalCommand { kExtract, kMatch };
+enum class EvalCommand { kExtract, kMatch, kStudy };
 
 // What the user asked for.
 struct CommandLine {
@@ -20,6 +21,8 @@ struct CommandLine {
   int repeat = 1;   // runs of each; the median of their times counts
   std::string out = "out";
   std::string json;  // empty: none
+
+  StudyOptions study;  // of kStudy, which takes none of the above
 };
 
 // Reads the command line. Empty if the program shall end at once with `exit_code` (help, bad usage

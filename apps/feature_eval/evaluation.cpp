@@ -1,6 +1,5 @@
 #include "apps/feature_eval/evaluation.h"
 
-#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <set>
@@ -17,11 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kDescriptorLength = 512;  // of a unit descriptor's bytes
-
 struct FeatureImage {
   GrayImage image;
-  FeatureSet features;
+  DescribedFeatures features;
 };
 
 // The file names without folder and ending; those that were there before are numbered.
@@ -46,14 +43,14 @@ void write_keypoints(const fs::path& path, const std::vector<Keypoint>& keypoint
   write_file(path, csv);
 }
 
-void write_matches(const fs::path& path, const FeatureSet& first, const FeatureSet& second,
-                   const std::vector<DescriptorMatch>& matches) {
+void write_matches(const fs::path& path, const DescribedFeatures& first,
+                   const DescribedFeatures& second, const std::vector<FeatureMatch>& matches) {
   std::string csv = "query,train,x1,y1,x2,y2,distance\n";
-  for (const DescriptorMatch& match : matches) {
+  for (const FeatureMatch& match : matches) {
     const Keypoint& a = first.keypoints[static_cast<std::size_t>(match.query)];
     const Keypoint& b = second.keypoints[static_cast<std::size_t>(match.train)];
     fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{:.5f}\n", match.query, match.train,
-                   a.x, a.y, b.x, b.y, std::sqrt(match.squared_distance) / kDescriptorLength);
+                   a.x, a.y, b.x, b.y, match.distance);
   }
   write_file(path, csv);
 }
@@ -71,7 +68,7 @@ class Methods {
     FeatureImage found;
     found.image = read_gray_image(result.image);
     for (int i = 0; i < line_.repeat; ++i) {
-      found.features = methods_[worker]->extract(found.image, result.times);
+      found.features = methods_[worker]->extract(found.image, nullptr, result.times);
     }
     result.width = found.image.width;
     result.height = found.image.height;
@@ -79,9 +76,9 @@ class Methods {
     return found;
   }
 
-  std::vector<DescriptorMatch> match(std::size_t worker, const FeatureImage& first,
-                                     const FeatureImage& second, MatchResult& result) {
-    std::vector<DescriptorMatch> matches;
+  std::vector<FeatureMatch> match(std::size_t worker, const FeatureImage& first,
+                                  const FeatureImage& second, MatchResult& result) {
+    std::vector<FeatureMatch> matches;
     for (int i = 0; i < line_.repeat; ++i) {
       matches = methods_[worker]->match(first.features, second.features, result.times);
     }

@@ -4,11 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/feature_eval/methods/described_features.h"
 #include "apps/io/stage_times.h"
-#include "backend/map/features.h"
 #include "frontend/features/image.h"
 #include "frontend/features/sift.h"
-#include "frontend/matching/brute_force.h"
 
 namespace hybrid_slam {
 
@@ -22,12 +21,21 @@ class FeatureMethod {
  public:
   virtual ~FeatureMethod() = default;
 
-  // Adds to `times` the total and each stage.
-  virtual FeatureSet extract(const GrayImage& image, StageTimes& times) = 0;
+  // Adds to `times` the total and each stage. `mask`: null, or an image of the same size whose zero
+  // pixels must hold no keypoint.
+  virtual DescribedFeatures extract(const GrayImage& image, const GrayImage* mask,
+                                    StageTimes& times) = 0;
 
-  // Matches that are mutually nearest and pass the ratio test at kMatchRatio, ascending by query.
-  virtual std::vector<DescriptorMatch> match(const FeatureSet& query, const FeatureSet& train,
-                                             StageTimes& times) = 0;
+  // Matches that are mutually nearest and pass the method's ratio test (kMatchRatio where nothing
+  // else is said), ascending by query. Adds to `times` the total.
+  virtual std::vector<FeatureMatch> match(const DescribedFeatures& query,
+                                          const DescribedFeatures& train, StageTimes& times);
+
+ protected:
+  explicit FeatureMethod(double ratio) : ratio_(ratio) {}
+
+ private:
+  double ratio_;
 };
 
 inline constexpr double kMatchRatio = 0.8;
@@ -39,7 +47,11 @@ std::string to_string(FeatureEngine engine);
 // Empty if the engine can be used here with these options, else why not, in one line.
 std::string why_no_engine(FeatureEngine engine, const SiftOptions& options);
 
+// RootSIFT, or the plain descriptor, L2-normalised.
+enum class SiftDescriptor { kRoot, kPlain };
+
 // SIFT by one that can be used.
-std::unique_ptr<FeatureMethod> make_sift_method(FeatureEngine engine, const SiftOptions& options);
+std::unique_ptr<FeatureMethod> make_sift_method(FeatureEngine engine, const SiftOptions& options,
+                                                SiftDescriptor kind = SiftDescriptor::kRoot);
 
 }  // namespace hybrid_slam

@@ -5,6 +5,7 @@
 
 #include "apps/feature_eval/command_line.h"
 #include "apps/feature_eval/evaluation.h"
+#include "apps/feature_eval/study/study_files.h"
 #include "apps/io/report.h"
 #include "apps/program/program.h"
 
@@ -110,6 +111,12 @@ int main(int argc, char** argv) {
     int exit_code = kExitOk;
     const auto line = parse_command_line(argc, argv, exit_code);
     if (!line) return exit_code;
+    if (line->command == EvalCommand::kStudy) {
+      const Study study = run_study(line->study);
+      write_study(study, line->study);
+      fmt::print("{}", study_text(study));
+      return kExitOk;
+    }
     const Json json = evaluation_json(*line, evaluate(*line));
     print_results(json);
     if (!line->json.empty()) write_json(line->json, json);

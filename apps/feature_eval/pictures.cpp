@@ -72,7 +72,7 @@ void write_keypoint_picture(const std::filesystem::path& path, const GrayImage& 
 void write_match_picture(const std::filesystem::path& path, const GrayImage& first,
                          const std::vector<Keypoint>& first_keypoints, const GrayImage& second,
                          const std::vector<Keypoint>& second_keypoints,
-                         const std::vector<DescriptorMatch>& matches) {
+                         const std::vector<FeatureMatch>& matches) {
   const int zoom = std::min(zoom_of(first), zoom_of(second));
   const cv::Mat left = enlarged(first, zoom), right = enlarged(second, zoom);
   const int shift = left.cols + kGap;
@@ -81,7 +81,7 @@ void write_match_picture(const std::filesystem::path& path, const GrayImage& fir
   left.copyTo(picture({0, 0, left.cols, left.rows}));
   right.copyTo(picture({shift, 0, right.cols, right.rows}));
   const auto draw_each = [&](cv::Mat& target, const auto& draw) {
-    for (const DescriptorMatch& match : matches) {
+    for (const FeatureMatch& match : matches) {
       const Keypoint& a = first_keypoints[static_cast<std::size_t>(match.query)];
       const Keypoint& b = second_keypoints[static_cast<std::size_t>(match.train)];
       draw(target, place(a.x, a.y, zoom), place(b.x, b.y, zoom, shift),

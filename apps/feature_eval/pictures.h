@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "apps/feature_eval/methods/described_features.h"
 #include "backend/map/features.h"
 #include "frontend/features/image.h"
-#include "frontend/matching/brute_force.h"
 
 namespace hybrid_slam {
 
@@ -21,6 +21,6 @@ void write_keypoint_picture(const std::filesystem::path& path, const GrayImage& 
 void write_match_picture(const std::filesystem::path& path, const GrayImage& first,
                          const std::vector<Keypoint>& first_keypoints, const GrayImage& second,
                          const std::vector<Keypoint>& second_keypoints,
-                         const std::vector<DescriptorMatch>& matches);
+                         const std::vector<FeatureMatch>& matches);
 
 }  // namespace hybrid_slam
