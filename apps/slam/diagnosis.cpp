@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "frontend/calibration/pair_alignment.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -171,6 +173,10 @@ void Diagnosis::look_at_pair(const CameraFrame& frame, Found& found) {
   if (frame.evidence.pair) pair_ = frame.evidence.pair;
   if (frame.evidence.pair && is_swapped(*pair_)) {
     found.push_back({Cause::kSwapped, pair_->reversed});
+  }
+  if (frame.evidence.alignment && frame.evidence.alignment->row_rms > kRowError) {
+    found.push_back({Cause::kCalibrationDoubtful, frame.evidence.alignment->row_rms});
+    return;  // the images that were compared are without it
   }
   if (!pair_) return;
   if (has_row_error(*pair_)) found.push_back({Cause::kCalibrationDoubtful, pair_->row_error});

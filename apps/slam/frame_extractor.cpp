@@ -6,6 +6,10 @@
 #include <utility>
 
 #include "apps/slam/sift_pool.h"
+#include "cameras/files/input_error.h"
+#include "frontend/input/image_file.h"
+#include "frontend/input/image_noise.h"
+#include "frontend/matching/pair_matches.h"
 
 namespace hybrid_slam {
 namespace {
@@ -32,13 +36,54 @@ std::vector<FeatureSet> find_by(SiftPool& pool, std::span<const GrayImage* const
   return features;
 }
 
-// Non-zero where both are.
+// Of the calibrated size; empty without a file.
+GrayImage read_mask(const std::string& path, const Calibrated<RectifiedStereo>& camera) {
+  if (path.empty()) return {};
+  GrayImage mask = read_gray_image(path, {camera.width, camera.height});
+  if (std::all_of(mask.pixels.begin(), mask.pixels.end(), [](auto pixel) { return pixel == 0; })) {
+    throw InputError(path + ": the mask covers the whole image: zero is what is left out");
+  }
+  return mask;
+}
+
+// Non-zero where both are. An empty one covers nothing.
 GrayImage both(const GrayImage& a, const GrayImage& b) {
+  if (a.empty()) return b;
+  if (b.empty()) return a;
   GrayImage mask = a;
   for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
     if (b.pixels[i] == 0) mask.pixels[i] = 0;
   }
   return mask;
+}
+
+// None where there is little noise.
+std::optional<StereoImages> quietened(const StereoImages& images) {
+  if (!is_noisy(images.left) && !is_noisy(images.right)) return std::nullopt;
+  StereoImages quiet = images;
+  suppress_noise(quiet.left);
+  suppress_noise(quiet.right);
+  return quiet;
+}
+
+// How the right camera stands, by the first pairs. By the first alone where that shows nothing to
+// be taken out: then it costs one pair without upsampling.
+std::shared_ptr<const PairAlignment> find_alignment(const Calibrated<RectifiedStereo>& camera,
+                                                    const SlamOptions& options,
+                                                    const FirstImages& first) {
+  SiftOptions plain = options.sift;
+  plain.upsample = false;
+  const auto sift = make_sift(plain);
+  std::vector<PairMatch> matches;
+  std::optional<PairAlignment> found;
+  for (const auto& images : first.stereo) {
+    const std::vector<PairMatch> pair =
+        match_pair(sift->extract(images->left, nullptr), sift->extract(images->right, nullptr));
+    matches.insert(matches.end(), pair.begin(), pair.end());
+    found = find_pair_alignment(camera, matches);
+    if (found && !found->is_shown()) break;
+  }
+  return found && found->is_shown() ? std::make_shared<const PairAlignment>(*found) : nullptr;
 }
 
 bool hardly_matches(const StereoFeatures& features) {
@@ -54,7 +99,11 @@ FrameExtractor::FrameExtractor(const CameraRig& cameras, const SlamOptions& opti
     : cameras_(cameras),
       options_(options),
       upsampling_(choose_upsampling(cameras, first.stereo, options_)),
-      sift_(std::make_unique<SiftPool>(device, options_.sift, 2)) {
+      alignment_(options.align_pair ? find_alignment(cameras.stereo, options_, first) : nullptr),
+      sift_(std::make_unique<SiftPool>(device, options_.sift, 2)),
+      left_mask_(read_mask(options.masks.left, cameras.stereo)),
+      right_mask_(read_mask(options.masks.right, cameras.stereo)) {
+  if (alignment_) aligner_.emplace(cameras.stereo, *alignment_);
   if (!cameras.fisheye) return;
   fisheye_sift_ = std::make_unique<SiftPool>(device, fisheye_sift(options_), 1);
   std::vector<GrayImage> examples;
@@ -67,16 +116,26 @@ FrameExtractor::~FrameExtractor() = default;
 std::vector<FeatureSet> FrameExtractor::find_features(const StereoImages& images,
                                                       StageTimes& times) {
   const std::array pair{&images.left, &images.right};
-  if (images.mask.empty()) return find_by(*sift_, pair, nullptr, "sift", times);
+  const GrayImage left_mask = both(left_mask_, images.mask);
+  const auto or_null = [](const GrayImage& mask) { return mask.empty() ? nullptr : &mask; };
+  if (left_mask.empty() && right_mask_.empty()) {
+    return find_by(*sift_, pair, nullptr, "sift", times);
+  }
   const std::span all(pair);
-  std::vector<FeatureSet> found = find_by(*sift_, all.first(1), &images.mask, "sift", times);
-  found.push_back(std::move(find_by(*sift_, all.last(1), nullptr, "sift", times).front()));
+  std::vector<FeatureSet> found = find_by(*sift_, all.first(1), or_null(left_mask), "sift", times);
+  found.push_back(
+      std::move(find_by(*sift_, all.last(1), or_null(right_mask_), "sift", times).front()));
   return found;
 }
 
-CameraFrame FrameExtractor::extract(const StereoImages& images, bool check_pair,
-                                    StageTimes& times) {
+CameraFrame FrameExtractor::extract(const StereoImages& input, bool check_pair, StageTimes& times) {
   StageClock clock(times);
+  std::optional<StereoImages> quiet = quietened(input);
+  if (aligner_) {
+    if (!quiet) quiet = input;
+    aligner_->align(quiet->right);
+  }
+  const StereoImages& images = quiet ? *quiet : input;
   std::vector<FeatureSet> found = find_features(images, times);
   clock.lap("sift");
   auto left_pyramid = std::make_shared<const ImagePyramid>(images.left);
@@ -85,11 +144,12 @@ CameraFrame FrameExtractor::extract(const StereoImages& images, bool check_pair,
       match_stereo(std::move(found[0]), std::move(found[1]), left_pyramid.get(), &right_pyramid,
                    cameras_.stereo, options_.stereo);
   clock.lap("stereo_match");
-  FrameEvidence evidence{{image_quality(images.left), image_quality(images.right)},
+  FrameEvidence evidence{{image_quality(input.left), image_quality(input.right)},
                          masked_share(images.mask),
                          std::nullopt,
                          0,
-                         0};
+                         0,
+                         alignment_};
   if (check_pair || hardly_matches(features)) {
     evidence.pair = hybrid_slam::check_pair(features.left, features.right);
   }
@@ -103,11 +163,11 @@ CameraFrame FrameExtractor::extract(const StereoImages& images, bool check_pair,
 CameraFrame FrameExtractor::extract(const FisheyeImage& images, StageTimes& times) {
   StageClock clock(times);
   GrayImage image = images.image;
+  suppress_noise(image);
   if (options_.fisheye.view.clahe > 0) enhance_contrast(image, options_.fisheye.view.clahe);
-  const GrayImage mask = images.mask.empty() ? GrayImage() : both(fisheye_mask_, images.mask);
+  const GrayImage mask = both(fisheye_mask_, images.mask);
   const std::array<const GrayImage*, 1> single{&image};
-  std::vector<FeatureSet> found =
-      find_by(*fisheye_sift_, single, mask.empty() ? &fisheye_mask_ : &mask, "fisheye_sift", times);
+  std::vector<FeatureSet> found = find_by(*fisheye_sift_, single, &mask, "fisheye_sift", times);
   Frame frame =
       make_mono_frame(0, to_seconds(images.time), std::move(found[0]), image.width, image.height);
   frame.image = std::make_shared<const ImagePyramid>(image);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "apps/slam/inputs.h"
 #include "apps/slam/slam_options.h"
 #include "apps/slam/upsampling.h"
+#include "frontend/calibration/pair_alignment.h"
 #include "frontend/features/sift_device.h"
 
 namespace hybrid_slam {
@@ -29,14 +31,14 @@ struct FirstImages {
 class FrameExtractor {
  public:
   // Settles upsampling and what the fisheye shows of the world by the first images. Throws
-  // InputError as make_fisheye_mask() does.
+  // InputError as make_fisheye_mask() does, and for masks that cannot be used.
   FrameExtractor(const CameraRig& cameras, const SlamOptions& options, SiftDevice device,
                  const FirstImages& first);
   ~FrameExtractor();
 
   // `check_pair`: whether the images are a pair is looked at in any case; else only where hardly
   // anything matches.
-  CameraFrame extract(const StereoImages& images, bool check_pair, StageTimes& times);
+  CameraFrame extract(const StereoImages& input, bool check_pair, StageTimes& times);
   CameraFrame extract(const FisheyeImage& image, StageTimes& times);
 
   const UpsamplingEvidence& upsampling() const { return upsampling_; }
@@ -48,8 +50,12 @@ class FrameExtractor {
   CameraRig cameras_;
   SlamOptions options_;
   UpsamplingEvidence upsampling_;
+  std::shared_ptr<const PairAlignment> alignment_;  // taken out of right images; null: nothing is
+  std::optional<RightAligner> aligner_;             // likewise
   std::unique_ptr<SiftPool> sift_;
   std::unique_ptr<SiftPool> fisheye_sift_;  // null without a fisheye
+  GrayImage left_mask_;                     // empty: all of the image shows the world
+  GrayImage right_mask_;                    // likewise
   GrayImage fisheye_mask_;                  // empty without a fisheye
 };
 

@@ -82,13 +82,16 @@ FrameTracking::FrameTracking(const CameraRig& cameras, const SlamOptions& option
       times_(times),
       localize_(localize),
       first_index_(next_frame_index(mapping.map().view())),
-      diagnosis_(options.features, cameras.fisheye.has_value()) {
+      diagnosis_(options.features, cameras.fisheye.has_value()),
+      stereo_floor_(mapping.camera_id(cameras.stereo)) {
+  rig_.rows = RowField(cameras.stereo.width, cameras.stereo.height);
   if (localize_ && !mapping.map().view().origin().valid()) {
     throw std::logic_error("FrameTracking: nothing to localise in");
   }
   if (cameras.fisheye) {
     fisheye_.emplace(mapping.camera_id(*cameras.fisheye), *cameras.fisheye,
                      options.fisheye.tracking, places_);
+    fisheye_floor_.emplace(mapping.camera_id(*cameras.fisheye));
   }
 }
 
@@ -105,14 +108,19 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
   result.landmarks = map.landmark_count();
   result.mapping_behind = !allow_keyframe;
   result.causes = diagnosis_.look(frame);
+  learn_calibration(frame);
+  follow_calibration(frame, map);
   TrackedFrame tracked = track_by_camera(frame, map, allow_keyframe && !localize_);
   if (!localize_) counts_.add(tracked.counts);  // else no keyframe would take them
   result.index = tracked.frame_index;
   result.state = state_of(tracked, map);
   if (frame.camera == CameraKind::kFisheye) {
     if (tracked.tracked()) result.left_from_fisheye = left_from_fisheye(map);
-  } else if (const auto cause = Diagnosis::look_at_offset(tracked.disparity_offset)) {
-    result.causes.push_back(*cause);
+  } else {
+    if (const auto cause = Diagnosis::look_at_offset(tracked.disparity_offset)) {
+      result.causes.push_back(*cause);
+    }
+    result.rig = findings(tracked);
   }
   const Keyframe* const reference_of_frame = map.find(tracked.reference);
   const bool begins = tracked.source == PoseSource::kInitialization;
@@ -120,13 +128,43 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
     result.component = reference_of_frame->component;
   }
   auto keyframe = std::exchange(tracked.keyframe, std::nullopt);
-  tracked.counts = {};
+  const double offset = tracked.disparity_offset;
+  tracked.counts.visible = {};
   result.tracked = std::move(tracked);
   observers_.frame(std::move(result));
   if (!keyframe) return std::nullopt;
   const KeyframeId reference = keyframe->reference;
   return MappingJob{frame.camera, std::move(*keyframe),
-                    reference.valid() ? map.cam_from_world(reference) : Rigid3d(), counts_.take()};
+                    reference.valid() ? map.cam_from_world(reference) : Rigid3d(), counts_.take(),
+                    offset};
+}
+
+// What the pair itself shows, before anything is corrected by the map.
+void FrameTracking::learn_calibration(const CameraFrame& frame) {
+  if (frame.camera != CameraKind::kStereo) return;
+  add_rows(frame.frame.features, rig_.rows);
+  rig_.median_disparity = median_disparity(frame.frame.features);
+  if (frame.evidence.alignment) rig_.alignment = *frame.evidence.alignment;
+}
+
+// Raises the frame's standard deviations by what lies under them, where that is known.
+void FrameTracking::follow_calibration(CameraFrame& frame, const MapSnapshot& map) {
+  FloorFinder& finder =
+      frame.camera == CameraKind::kStereo ? stereo_floor_ : fisheye_floor_.value();
+  if (finder.follow(map)) {
+    if (frame.camera == CameraKind::kStereo) {
+      stereo_.use_floor(finder.floor());
+    } else {
+      fisheye_->use_floor(finder.floor());
+    }
+  }
+  if (finder.floor()) finder.floor()->raise(frame.frame.features.left);
+}
+
+std::shared_ptr<const RigFindings> FrameTracking::findings(const TrackedFrame& tracked) {
+  rig_.disparity_offset = tracked.disparity_offset;
+  rig_.disparity_sigma = stereo_.disparity().sigma();
+  return std::make_shared<const RigFindings>(rig_);
 }
 
 // Where both cameras have a pose of this moment.

@@ -6,6 +6,7 @@
 #include "apps/slam/diagnosis.h"
 #include "apps/slam/local_mapping.h"
 #include "apps/slam/observers.h"
+#include "frontend/calibration/rig_calibrator.h"
 #include "frontend/place_recognition/keyframe_database.h"
 #include "frontend/tracking/fisheye_tracker.h"
 #include "frontend/tracking/stereo_tracker.h"
@@ -32,6 +33,9 @@ class FrameTracking {
 
  private:
   std::optional<UncertainMotion> left_from_fisheye(const MapSnapshot& map) const;
+  void follow_calibration(CameraFrame& frame, const MapSnapshot& map);
+  void learn_calibration(const CameraFrame& frame);
+  std::shared_ptr<const RigFindings> findings(const TrackedFrame& tracked);
   TrackedFrame track_by_camera(CameraFrame& frame, const MapSnapshot& map, bool allow_keyframe);
 
   std::shared_ptr<KeyframeDatabase> places_;
@@ -44,6 +48,9 @@ class FrameTracking {
   KeyframeId stereo_reference_;  // of the last stereo frame; invalid if that was lost
   LandmarkCounts counts_;        // since the last keyframe
   Diagnosis diagnosis_;
+  FloorFinder stereo_floor_;
+  std::optional<FloorFinder> fisheye_floor_;
+  RigFindings rig_;
 };
 
 }  // namespace hybrid_slam

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -13,6 +14,8 @@
 #include "frontend/tracking/frame.h"
 
 namespace hybrid_slam {
+
+struct PairAlignment;
 
 // Time of the sensors' common clock [ns]; from any origin.
 using Nanoseconds = std::int64_t;
@@ -74,6 +77,8 @@ struct FrameEvidence {
   std::optional<PairCheck> pair;     // of some stereo pairs
   int late = 0;                      // inputs of this camera left out since the frame before
   int dropped = 0;                   // likewise, for want of time
+  // What was taken out of the right image, see PairAlignment; null: nothing.
+  std::shared_ptr<const PairAlignment> alignment{};
 };
 
 // An input that will not be tracked.

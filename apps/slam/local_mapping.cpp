@@ -1,6 +1,10 @@
 #include "apps/slam/local_mapping.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
+#include <vector>
 
 #include "frontend/mapping/fusion.h"
 #include "frontend/mapping/triangulation.h"
@@ -8,6 +12,20 @@
 namespace hybrid_slam {
 
 namespace {
+
+constexpr double kDoubtfulScale = 0.01;  // beyond which a rig should be calibrated again
+
+// Infinite without right matches: then nothing is shown.
+double median_disparity(const FrameObservations& seen) {
+  std::vector<double> disparities;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen.has_right(i)) disparities.push_back(seen.features.keypoints[i].x - seen.u_right[i]);
+  }
+  if (disparities.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);
+  std::nth_element(disparities.begin(), middle, disparities.end());
+  return *middle;
+}
 
 // The keyframe as it lies in `map`, which may have moved since it was tracked: by a loop that was
 // closed, far.
@@ -60,6 +78,7 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   MapEdit counts;
   counts.counted = job.counts;
   backend_.apply(counts);
+  take_offset_out(job);
   const KeyframeId id = backend_.add(carried_along(job, backend_.view()));
   backend_.apply(probation_.cull(backend_.view(), id));
   clock.lap("insert_keyframe");
@@ -76,6 +95,19 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   clock.lap("drop_features");
   publish();
   return id;
+}
+
+// What was found out about the pair meanwhile holds for all its keyframes, not for the new ones
+// alone. Of a rig that is hardly off, it is left to those to come: less than the map may be off by
+// anyway is not worth moving all of it.
+void LocalMapping::take_offset_out(const MappingJob& job) {
+  if (job.camera != CameraKind::kStereo) return;
+  const double by = job.disparity_offset - disparity_offset_;
+  const double most = std::max(std::abs(job.disparity_offset), std::abs(disparity_offset_));
+  if (by == 0 || most < kDoubtfulScale * median_disparity(*job.keyframe.observations)) return;
+  backend_.shift_disparities(job.keyframe.observations->camera, by);
+  if (wants_full_bundle(backend_.view(), options_.backend.full)) backend_.optimize_full();
+  disparity_offset_ = job.disparity_offset;
 }
 
 LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,

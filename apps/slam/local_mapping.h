@@ -22,6 +22,7 @@ struct MappingJob {
   NewKeyframe keyframe;
   Rigid3d reference_from_world;  // pose of keyframe.reference in the map it was tracked in
   std::vector<LandmarkCount> counts;
+  double disparity_offset = 0;  // [px] that was taken out of a stereo keyframe's disparities
 
   std::int64_t frame_index() const { return keyframe.observations->frame_index; }
 };
@@ -73,10 +74,13 @@ class LocalMapping {
   const Map& map() const { return backend_.map(); }
 
  private:
+  void take_offset_out(const MappingJob& job);
+
   SlamOptions options_;
   Backend backend_;
   LandmarkProbation probation_;
   KeyframeUse use_;
+  double disparity_offset_ = 0;  // [px] that was taken out of all stereo keyframes
 };
 
 }  // namespace hybrid_slam

@@ -91,6 +91,7 @@ void Recorder::tracked(const FrameResult& frame) {
   FrameConditions& conditions = stereo ? result_.conditions : result_.fisheye_conditions;
   ++conditions.states[to_string(frame.state)];
   for (const FoundCause& found : frame.causes) ++conditions.causes[to_string(found.cause)];
+  if (frame.rig) result_.rig = frame.rig;
   if (hooks_.frame) hooks_.frame(frame);
   progress_.keyframes = frame.keyframes;
   progress_.landmarks = frame.landmarks;

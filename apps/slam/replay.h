@@ -15,6 +15,8 @@
 
 namespace hybrid_slam {
 
+struct RigFindings;
+
 // Inputs of one moment, all of one time, or why there are none.
 struct Moment {
   std::vector<SensorInput> inputs;
@@ -105,11 +107,16 @@ struct ReplayProgress {
   std::size_t landmarks = 0;
 };
 
-// What a replay needs from outside. When `cancelled` is requested, at any moment, the run ends in
-// order, with what it has. The functions are called by one thread at a time, not always the same.
+// What a run needs from outside; what is empty costs nothing. When `cancelled` is requested, at any
+// moment, the run ends in order, with what it has. The functions are called by one thread at a
+// time, not always the same.
 struct ReplayHooks {
-  std::function<void(const FrameResult&)> frame;        // of each camera, once it was tracked
-  std::function<void(const LeftOut&)> left_out;         // of each camera, if it never will be
+  std::function<void(const FrameResult&)> frame;  // of each camera, once it was tracked
+  std::function<void(const LeftOut&)> left_out;   // of each camera, if it never will be
+  std::function<void(const LoopRecord&)> loop;    // as SessionObservers tell of them
+  std::function<void(const std::shared_ptr<const MapSnapshot>&, MapChange)> map;
+  // What is about to be pushed. Called by who reads, while others are called.
+  std::function<void(const Moment&)> images;
   std::function<void(const ReplayProgress&)> progress;  // after each stereo frame
   std::function<void(const std::string&)> warning;      // one line each
   std::stop_token cancelled;
@@ -136,6 +143,8 @@ struct RunResult {
   std::vector<LoopRecord> loops;  // places proposed, in the order in which they were looked at
   std::optional<UpsamplingEvidence> upsampling;  // none where there were no images
   bool upsampled = false;
+  // The newest of the calibration, see FrameResult::rig; null where there is none.
+  std::shared_ptr<const RigFindings> rig;
   MapFileInfo file_info;  // of the map, for save_map()
   StageTimes times;
   bool cancelled = false;

@@ -20,6 +20,8 @@
 
 namespace hybrid_slam {
 
+struct RigFindings;
+
 enum class SessionMode {
   // Every input is tracked and mapped before the next, loops closed and everything adjusted before
   // that. Same input, options and seed give the same results, bit for bit.
@@ -69,7 +71,7 @@ struct FrameResult {
   Nanoseconds time = 0;
   std::int64_t index = 0;  // of its moment in the map: frames of both cameras at one time share it
   TrackingState state = TrackingState::kStarting;
-  TrackedFrame tracked;  // without its keyframe and counts
+  TrackedFrame tracked;  // without its keyframe and counts.visible
   // Of a fisheye whose moment has a stereo pair, where both have poses: the fisheye's pose in the
   // left camera, with all that both are off by in common taken out.
   std::optional<UncertainMotion> left_from_fisheye;
@@ -81,6 +83,8 @@ struct FrameResult {
   // Of the map, that it has a pose in; invalid without one, and of the frame that begins one.
   KeyframeId component;
   bool mapping_behind = false;  // it could have become no keyframe: too many wait
+  // Of the stereo pair: what is known of its calibration up to here.
+  std::shared_ptr<const RigFindings> rig{};
 
   bool has_pose() const { return tracked.tracked(); }
 };

@@ -203,6 +203,7 @@ void fields_of(S section, StereoTrackerOptions& options) {
   fields_of(section.section("disparity"), options.disparity);
   fields_of(section.section("shading"), options.refinement.shading);
   section.field("new_components", options.new_components)
+      .field("moving_regions", options.moving_regions)
       .field("min_initial_share", options.min_initial_share)
       .field("close_baselines", options.close_baselines)
       .field("min_new_points", options.min_new_points)
@@ -276,6 +277,11 @@ void fields_of(S section, CullingOptions& options) {
 }
 
 template <typename S>
+void fields_of(S section, MaskOptions& options) {
+  section.field("left", options.left).field("right", options.right).refuse_unknown();
+}
+
+template <typename S>
 void fields_of(S section, LoopOptions& options) {
   LoopDetectorOptions& detector = options.finder.detector;
   LoopVerifierOptions& verifier = options.finder.verifier;
@@ -328,9 +334,13 @@ void fields_of(S top, SlamOptions& options) {
   fields_of(top.section("triangulation"), options.triangulation);
   fields_of(top.section("fusion"), options.fusion);
   fields_of(top.section("culling"), options.culling);
+  fields_of(top.section("masks"), options.masks);
   fields_of(top.section("loops"), options.loops);
   fields_of(top.section("backend"), options.backend);
-  top.field("features", options.features).field("seed", options.seed).refuse_unknown();
+  top.field("features", options.features)
+      .field("seed", options.seed)
+      .field("align_pair", options.align_pair)
+      .refuse_unknown();
 }
 
 }  // namespace

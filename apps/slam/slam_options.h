@@ -33,6 +33,13 @@ struct FisheyeOptions {
   double stereo_tracked_ratio = 0.75;
 };
 
+// Files of images of the calibrated size: where one is zero, the stereo pair's left or right image
+// never shows anything of the world (the vehicle's frame, a lamp). Empty: none.
+struct MaskOptions {
+  std::string left;
+  std::string right;
+};
+
 // Loop closing.
 struct LoopOptions {
   bool enabled = true;
@@ -43,9 +50,12 @@ struct LoopOptions {
 struct SlamOptions {
   int features = 2000;  // N: per image; also the measure of the tracker's shares
   std::uint64_t seed = 0;
+  // Whether right images are re-warped where the first pairs show them out of row (PairAlignment).
+  bool align_pair = true;
   SiftOptions sift;
   Upsampling upsampling = Upsampling::kAuto;  // of the stereo pair; sift.upsample follows it
   StereoMatcherOptions stereo;
+  MaskOptions masks;
   StereoTrackerOptions tracking;
   FisheyeOptions fisheye;
   TriangulationOptions triangulation;
