@@ -3,33 +3,31 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "apps/hybrid_slam/input_choice.h"
 #include "apps/slam/session_types.h"
 #include "apps/slam/slam_options.h"
+#include "apps/view/http_server.h"
 #include "frontend/features/sift_device.h"
-#include "frontend/input/image_sequence.h"
 
 namespace hybrid_slam {
 
 // What the user asked for.
 struct CommandLine {
-  std::string dataset;
-  SequenceLayout layout = SequenceLayout::kAuto;
-  std::string sequence;
-  SequenceCameras cameras = SequenceCameras::kAuto;
-  TruthConvention truth_convention = TruthConvention::kAuto;
-  InputOptions input;
+  InputChoice input;
   std::string out = "out";
   SessionMode mode = SessionMode::kEveryFrame;
   double rate = 0;                       // [Hz]; 0: images wait for the pipeline
   int threads = 0;                       // 0: one per core
   SiftDevice device = SiftDevice::kCpu;  // that SIFT runs on
-  std::size_t limit = 0;
-  int checkpoint_every = 0;  // keyframes; 0: never
+  int checkpoint_every = 0;              // keyframes; 0: never
   bool quiet = false;
-  std::string map;        // a file to go on with; empty: a new map
-  bool localize = false;  // track in the map without changing it
-  std::string log;        // a file; empty: none
+  bool report = true;                 // write report.html
+  std::optional<ServerOptions> view;  // where the run can be watched; none: nowhere
+  std::string map;                    // a file to go on with; empty: a new map
+  bool localize = false;              // track in the map without changing it
+  std::string log;                    // a file; empty: none
   std::string log_level = "info";
   std::string vocabulary;  // a file; empty: the one that is part of the program
   SlamOptions options;

@@ -3,17 +3,15 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "apps/io/trajectory.h"
+#include "apps/slam/frame_figures.h"
 #include "cameras/geometry/uncertain_motion.h"
 
 namespace hybrid_slam {
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr std::array kAxes = {"x", "y", "z", "rx", "ry", "rz"};
 
 // Columns of a pose, of the upper triangle of its covariance, and what they hold.
@@ -56,16 +54,6 @@ constexpr int kCovarianceColumns = 21;
 
 std::string id_of(KeyframeId id) { return id.valid() ? fmt::format(",{}", id.value) : ","; }
 
-// "dark=13;few_features=0.02".
-std::string causes_of(const FrameResult& frame) {
-  std::string text;
-  for (const FoundCause& found : frame.causes) {
-    text +=
-        fmt::format("{}{}={:.4g}", text.empty() ? "" : ";", to_string(found.cause), found.value);
-  }
-  return text;
-}
-
 std::string header() {
   return "camera,time,index,state,source,prediction,causes" + pose_columns("") +
          ",sigma_position,sigma_rotation_deg,covariance_base,reference" +
@@ -76,13 +64,9 @@ std::string header() {
 
 // The frame's pose in the map, how far off it may be, and the motion from its reference keyframe,
 // through which it follows what becomes of the map.
-std::string pose_values(const TrackedFrame& tracked, Matrix6d& covariance) {
-  const UncertainMotion world_from_cam =
-      inverse(UncertainMotion{tracked.cam_from_world, tracked.covariance});
-  covariance = ros_covariance(world_from_cam);
-  std::string text = values(world_from_cam.b_from_a);
-  text += fmt::format(",{:.6g},{:.6g}", std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
-                      kDegrees * std::sqrt(covariance.bottomRightCorner<3, 3>().trace()));
+std::string pose_values(const TrackedFrame& tracked, const PoseFigures& figures) {
+  std::string text = values(figures.world_from_cam);
+  text += fmt::format(",{:.6g},{:.6g}", figures.sigma_position, figures.sigma_rotation_deg);
   text += id_of(tracked.covariance_base) + id_of(tracked.reference);
   return text + (tracked.reference.valid() ? values(inverse(tracked.cam_from_reference))
                                            : commas(kPoseColumns));
@@ -93,13 +77,14 @@ std::string row(const FrameResult& frame) {
   std::string text =
       fmt::format("{},{:.9f},{},{},{},{},{}", to_string(frame.camera), to_seconds(frame.time),
                   frame.index, to_string(frame.state), to_string(tracked.source),
-                  to_string(tracked.prediction), causes_of(frame));
-  Matrix6d covariance = Matrix6d::Zero();
+                  to_string(tracked.prediction), causes_text(frame));
+  PoseFigures figures;
+  if (frame.has_pose()) figures = pose_figures(tracked);
   text +=
-      frame.has_pose() ? pose_values(tracked, covariance) : commas(kPoseColumns + 4 + kPoseColumns);
+      frame.has_pose() ? pose_values(tracked, figures) : commas(kPoseColumns + 4 + kPoseColumns);
   text += fmt::format(",{},{},{},{},{},{}", frame.features, frame.stereo_matches, tracked.inliers,
                       tracked.odometer_inliers, frame.keyframes, frame.landmarks);
-  return text + (frame.has_pose() ? values(covariance) : commas(kCovarianceColumns)) +
+  return text + (frame.has_pose() ? values(figures.covariance) : commas(kCovarianceColumns)) +
          id_of(frame.component);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "apps/hybrid_slam/command_line.h"
+#include "apps/hybrid_slam/run_input.h"
 #include "apps/io/hybrid_error.h"
 #include "apps/io/trajectory.h"
 #include "apps/slam/replay.h"
@@ -18,8 +19,8 @@ struct RunSummary {
 void write_map(const CommandLine& line, const MapSnapshot& map, const MapFileInfo& info);
 
 // Writes every file of the run into line.out. Throws OutputError.
-RunSummary write_outputs(const CommandLine& line, const SequenceInfo& sequence,
-                         const RunResult& result, double seconds);
+RunSummary write_outputs(const CommandLine& line, RunInput& input, const RunResult& result,
+                         double seconds);
 
 // A few lines for people.
 void print_summary(const CommandLine& line, const RunResult& result, const RunSummary& summary);

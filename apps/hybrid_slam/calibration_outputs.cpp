@@ -1,0 +1,138 @@
+#include "apps/hybrid_slam/calibration_outputs.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "cameras/files/output_file.h"
+
+namespace hybrid_slam {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kScale = 0.01;       // error of the scale beyond which a rig is to be calibrated
+constexpr double kRows = 0.75;        // [px] of the 1 px that stereo matches have
+constexpr double kSystematic = 0.25;  // [px] half of what a keypoint's own place is good for
+
+void judge_rows(const RigFindings& rig, std::vector<std::string>& reasons) {
+  if (rig.alignment) {
+    reasons.push_back(fmt::format(
+        "rows are {:.2f} px off: the right camera is turned by {:.3f} deg about x and {:.3f} deg "
+        "about z, its focal length is {:+.2f} % longer (taken out)",
+        rig.alignment->row_rms, kDegrees * rig.alignment->pitch, kDegrees * rig.alignment->roll,
+        100 * rig.alignment->focal_ratio));
+  }
+  const double rows = rig.rows.systematic_rms();
+  if (rows > kRows) {
+    reasons.push_back(fmt::format("rows are {:.2f} px off by place in the image", rows));
+  }
+}
+
+// Where an offset is in use it is no accident: DisparityCalibrator sees to that.
+void judge_disparities(const RigFindings& rig, std::vector<std::string>& reasons) {
+  if (!(rig.median_disparity > 0)) return;
+  const double scale = std::abs(rig.disparity_offset) / rig.median_disparity;
+  if (scale <= kScale) return;
+  reasons.push_back(fmt::format("disparities are {:.2f} px off, {:.1f} % of the scale (taken out)",
+                                rig.disparity_offset, 100 * scale));
+}
+
+void judge_residuals(const MapSnapshot& map, CalibrationFigures& figures) {
+  for (std::size_t i = 0; i < figures.maps.size(); ++i) {
+    const SystematicPart& part = figures.systematic[i];
+    const double off = std::max(part.image_rms, part.disparity_rms);
+    if (off <= kSystematic) continue;
+    const bool stereo = baseline(map.camera(figures.maps[i].camera)) > 0;
+    figures.reasons.push_back(fmt::format("{}: residuals are {:.2f} px off by place in the image",
+                                          stereo ? "stereo" : "fisheye", off));
+  }
+}
+
+std::string field(double value) {
+  return std::isfinite(value) ? fmt::format(",{:.5f}", value) : std::string(",");
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+}  // namespace
+
+CalibrationFigures calibration_figures(const MapSnapshot& map, const RigFindings* rig) {
+  CalibrationFigures figures;
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    figures.maps.push_back(residual_map(map, CameraId(i), std::numeric_limits<std::size_t>::max()));
+    figures.systematic.push_back(systematic_part(figures.maps.back()));
+  }
+  if (rig != nullptr) {
+    figures.rig = *rig;
+    figures.stereo = true;
+    judge_rows(*rig, figures.reasons);
+    judge_disparities(*rig, figures.reasons);
+  }
+  judge_residuals(map, figures);
+  return figures;
+}
+
+Json to_json(const CalibrationFigures& figures) {
+  Json json;
+  json["doubtful"] = !figures.reasons.empty();
+  json["reasons"] = figures.reasons;
+  if (figures.stereo) {
+    const RigFindings& rig = figures.rig;
+    if (rig.alignment) {
+      json["taken_out"] = {{"pitch_deg", kDegrees * rig.alignment->pitch},
+                           {"roll_deg", kDegrees * rig.alignment->roll},
+                           {"focal_ratio", 1 + rig.alignment->focal_ratio},
+                           {"rows_px", rig.alignment->row_rms},
+                           {"row_sigma_px", rig.alignment->row_sigma}};
+    } else {
+      json["taken_out"] = Json();
+    }
+    json["rows_px"] = rig.rows.systematic_rms();
+    json["disparity_offset_px"] = rig.disparity_offset;
+    json["disparity_offset_sigma_px"] = number(rig.disparity_sigma);
+    json["median_disparity_px"] = rig.median_disparity;
+  }
+  Json& systematic = json["systematic_px"] = Json::array();
+  for (const SystematicPart& part : figures.systematic) {
+    systematic.push_back({{"image", part.image_rms},
+                          {"disparity", part.disparity_rms},
+                          {"significance", part.significance}});
+  }
+  return json;
+}
+
+void write_calibration(const std::filesystem::path& path, const MapSnapshot& map,
+                       const CalibrationFigures& figures) {
+  std::string text =
+      "camera,column,row,u_px,v_px,count,mean_u_px,mean_v_px,mean_disparity_px,mean_row_px,"
+      "sigma_u_px,sigma_v_px,sigma_disparity_px,sigma_row_px,floor_px,floor_disparity_px\n";
+  for (std::size_t i = 0; i < figures.maps.size(); ++i) {
+    const ResidualMap& residuals = figures.maps[i];
+    const bool stereo = baseline(map.camera(residuals.camera)) > 0;
+    for (std::size_t cell = 0; cell < residuals.cells.size(); ++cell) {
+      const Moments u = residuals.all(cell, MeasuredBy::kU);
+      const Moments v = residuals.all(cell, MeasuredBy::kV);
+      const Moments disparity = residuals.all(cell, MeasuredBy::kDisparity);
+      const Moments rows = stereo && figures.stereo ? figures.rig.rows.at(cell) : Moments();
+      text += fmt::format("{},{},{},{:.1f},{:.1f},{:.0f}", stereo ? "stereo" : "fisheye",
+                          cell % ImageCells::kColumns, cell / ImageCells::kColumns,
+                          residuals.cells.center_x(cell), residuals.cells.center_y(cell), u.count);
+      for (const Moments& one : {u, v, disparity, rows}) {
+        text += one.count > 0 ? field(one.mean()) : std::string(",");
+      }
+      for (const Moments& one : {u, v, disparity, rows}) {
+        text += one.count > 1 ? field(std::sqrt(one.variance())) : std::string(",");
+      }
+      text += field(std::sqrt(figures.systematic[i].image[cell])) +
+              (stereo ? field(std::sqrt(figures.systematic[i].disparity[cell])) : ",") + "\n";
+    }
+  }
+  write_file(path, text);
+}
+
+}  // namespace hybrid_slam
