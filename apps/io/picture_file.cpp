@@ -40,8 +40,9 @@ bool encode_png(const cv::Mat& picture, std::string& file) {
   if (writer.info == nullptr || setjmp(png_jmpbuf(writer.png)) != 0) return false;
   png_set_write_fn(writer.png, &file, append, flush);
   png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(picture.cols),
-               static_cast<png_uint_32>(picture.rows), 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+               static_cast<png_uint_32>(picture.rows), 8,
+               picture.channels() == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   // Drawings are mostly of one colour: fast, and as small as with more effort.
   png_set_compression_level(writer.png, Z_BEST_SPEED);
   png_set_compression_strategy(writer.png, Z_RLE);
@@ -56,7 +57,9 @@ bool encode_png(const cv::Mat& picture, std::string& file) {
 }  // namespace
 
 void write_picture(const std::filesystem::path& path, const cv::Mat& picture) {
-  if (picture.type() != CV_8UC3) throw std::logic_error("the picture is not in colour");
+  if (picture.type() != CV_8UC3 && picture.type() != CV_8UC1) {
+    throw std::logic_error("the picture is neither in colour nor grey");
+  }
   std::string file;
   if (!encode_png(picture, file)) throw std::logic_error("the picture is not encoded");
   write_file(path, file);

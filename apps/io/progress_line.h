@@ -7,7 +7,8 @@
 namespace hybrid_slam {
 
 // How far a program is, to stderr: one line that is written over on a terminal, a plain line now
-// and then elsewhere. "<done>/<total> <unit>  <rate>/s  <left> s left  <more>".
+// and then elsewhere. "<done>/<total> <unit>  <rate>/s  <left> s left  <more>"; where nobody knows
+// the total, it is 0, and "<done> <unit>  <rate>/s  <more>" is said.
 class ProgressLine {
  public:
   // `quiet`: prints nothing.

@@ -69,6 +69,7 @@ void take_estimate(const OptimizerProblem& problem, FactorGraph& to) {
   for (std::size_t i = 0; i < to.cameras.size(); ++i) {
     to.cameras[i].camera = from.cameras[i].camera;
   }
+  for (std::size_t i = 0; i < to.blocks.size(); ++i) to.blocks[i].values = from.blocks[i].values;
 }
 
 OptimizerResult optimize(const CommandLine& line, const GraphFile& file, PhaseTimes& times) {

@@ -4,6 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include <ceres/cost_function.h>
+
 #include "backend/problem/full_bundle.h"
 #include "backend/problem/local_bundle.h"
 #include "backend/problem/loop_graph.h"
@@ -127,6 +129,13 @@ void restrict(const GraphFile& file, const OptimizerOptions& options,
               const std::filesystem::path& input, FactorGraph& problem) {
   if (options.fix_intrinsics) {
     for (GraphCamera& camera : problem.cameras) camera.refined = 0;
+    for (GraphBlock& block : problem.blocks) block.fixed = true;
+  }
+  const ProblemOptions thresholds;
+  for (GraphFactor& factor : problem.factors) {
+    factor.loss = loss_of(options);
+    factor.threshold =
+        factor.function->num_residuals() == 3 ? thresholds.chi2_stereo : thresholds.chi2_mono;
   }
   if (options.problem == ProblemKind::kLoop) {
     if (problem.edges.empty()) throw InputError(input.string() + ": holds no edges between poses");
@@ -151,8 +160,9 @@ OptimizerProblem make_problem(const GraphFile& file, const OptimizerOptions& opt
                               const std::filesystem::path& input) {
   const bool bundles_of_map = file.map != nullptr && !file.graph.frames.empty() &&
                               options.problem != ProblemKind::kIncremental;
-  if (options.problem == ProblemKind::kIncremental && !file.graph.factors.empty()) {
-    throw InputError(input.string() + ": holds landmarks, which --problem incremental cannot feed");
+  if (options.problem != ProblemKind::kFull && !file.graph.factors.empty()) {
+    throw InputError(input.string() +
+                     ": holds landmarks or cameras that only --problem full can take");
   }
   OptimizerProblem problem;
   if (bundles_of_map) {

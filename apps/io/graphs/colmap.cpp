@@ -7,8 +7,11 @@
 #include <memory>
 #include <unordered_map>
 
+#include <ceres/cost_function.h>
+#include "apps/io/graphs/colmap_cameras.h"
 #include "apps/io/graphs/colmap_rigs.h"
 #include "apps/io/graphs/graph_errors.h"
+
 #include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
@@ -16,57 +19,6 @@ namespace hybrid_slam {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kFirstPixelCentre = 0.5;  // in COLMAP's pixels, in both directions
-
-// Both programs have the focal lengths first, then the principal point, then the distortion.
-std::size_t focal_lengths(const ColmapCameraKind& kind) {
-  const bool two =
-      kind.model == ColmapCameraModel::kPinhole || kind.model == ColmapCameraModel::kOpencvFisheye;
-  return two ? 2 : 1;
-}
-
-// All but the principal point.
-std::uint32_t refined_params(const ColmapCameraKind& kind) {
-  const std::uint32_t all = (1U << kind.params) - 1;
-  return all & ~(0b11U << focal_lengths(kind));
-}
-
-// A simpler model's missing coefficients are zero.
-template <ProjectionModel M>
-GraphCamera to_graph(const ColmapCamera& camera) {
-  Calibrated<M> result{{}, static_cast<int>(camera.width), static_cast<int>(camera.height)};
-  std::copy(camera.params.begin(), camera.params.end(), result.params.begin());
-  const std::size_t principal = focal_lengths(camera.kind);
-  result.params[principal] -= kFirstPixelCentre;
-  result.params[principal + 1] -= kFirstPixelCentre;
-  return {result, refined_params(camera.kind)};
-}
-
-GraphCamera to_graph(const ColmapCamera& camera) {
-  switch (camera.kind.model) {
-    case ColmapCameraModel::kSimplePinhole:
-    case ColmapCameraModel::kSimpleRadial:
-    case ColmapCameraModel::kRadial:
-      return to_graph<Radial>(camera);
-    case ColmapCameraModel::kPinhole:
-      return to_graph<Pinhole>(camera);
-    case ColmapCameraModel::kOpencvFisheye:
-      return to_graph<KannalaBrandt>(camera);
-  }
-  throw std::logic_error("no such COLMAP camera");
-}
-
-void from_graph(const Camera& from, ColmapCamera& camera) {
-  std::visit(
-      [&](const auto& c) {
-        std::copy_n(c.params.begin(), camera.params.size(), camera.params.begin());
-      },
-      from);
-  const std::size_t principal = focal_lengths(camera.kind);
-  camera.params[principal] += kFirstPixelCentre;
-  camera.params[principal + 1] += kFirstPixelCentre;
-}
 
 template <typename Id>
 using Index = std::unordered_map<Id, std::uint32_t>;
@@ -104,8 +56,9 @@ void check_tracks(const ColmapModel& model, const Index<std::uint32_t>& images) 
   }
 }
 
-void add_observations(const ColmapModel& model, const Index<std::uint64_t>& points,
-                      FactorGraph& graph) {
+void add_observations(const ColmapModel& model, const Index<std::uint32_t>& cameras,
+                      const Index<std::uint64_t>& points,
+                      const std::vector<ColmapCameraPlace>& places, FactorGraph& graph) {
   for (std::uint32_t i = 0; i < model.images.size(); ++i) {
     const ColmapImage& image = model.images[i];
     for (const ColmapPoint2d& seen : image.points) {
@@ -116,10 +69,16 @@ void add_observations(const ColmapModel& model, const Index<std::uint64_t>& poin
             "images", image.place,
             fmt::format("image {} names point {}, which there is not", image.id, seen.point));
       }
+      const std::uint32_t camera = cameras.at(image.camera);
+      if (places[camera].kind == ColmapCameraPlace::Kind::kBlock) {
+        graph.factors.push_back(block_observation(model.cameras[camera], places[camera].index, i,
+                                                  point->second, seen.pixel));
+        continue;
+      }
       GraphObservation observation;
       observation.frame = i;
       observation.point = point->second;
-      observation.measurement.head<2>() = seen.pixel.array() - kFirstPixelCentre;
+      observation.measurement.head<2>() = seen.pixel.array() - kColmapFirstPixel;
       graph.observations.push_back(observation);
     }
   }
@@ -141,21 +100,14 @@ void add_rigs(const ColmapModel& model, FactorGraph& graph) {
   }
 }
 
-GraphFile to_graph(const ColmapModel& model) {
+GraphFile to_graph(const ColmapModel& model, std::vector<ColmapCameraPlace>& places) {
   const auto cameras = index_by_id<std::uint32_t>(model, model.cameras, "cameras", "camera");
   const auto images = index_by_id<std::uint32_t>(model, model.images, "images", "image");
   const auto points = index_by_id<std::uint64_t>(model, model.points, "points3D", "point");
   check_tracks(model, images);
   GraphFile file;
   FactorGraph& graph = file.graph;
-  for (const ColmapCamera& camera : model.cameras) {
-    for (std::size_t i = 0; i < focal_lengths(camera.kind); ++i) {
-      if (!(camera.params[i] > 0)) {
-        throw model.error("cameras", camera.place, "the focal length must be positive");
-      }
-    }
-    graph.cameras.push_back(to_graph(camera));
-  }
+  places = add_colmap_cameras(model, graph);
   for (const ColmapImage& image : model.images) {
     const auto camera = cameras.find(image.camera);
     if (camera == cameras.end()) {
@@ -163,7 +115,8 @@ GraphFile to_graph(const ColmapModel& model) {
     }
     GraphFrame frame;
     frame.cam_from_world = image.cam_from_world;
-    frame.camera = camera->second;
+    const ColmapCameraPlace& place = places[camera->second];
+    if (place.kind == ColmapCameraPlace::Kind::kCamera) frame.camera = place.index;
     frame.fixed = graph.frames.empty();
     graph.frames.push_back(frame);
     file.frame_names.push_back(image.name);
@@ -172,7 +125,7 @@ GraphFile to_graph(const ColmapModel& model) {
     graph.points.push_back({point.in_world});
     file.point_ids.push_back(point.id);
   }
-  add_observations(model, points, graph);
+  add_observations(model, cameras, points, places, graph);
   add_rigs(model, graph);
   return file;
 }
@@ -187,15 +140,26 @@ void update_errors(const FactorGraph& graph, ColmapModel& model) {
       ++counts[o.point];
     }
   }
+  for (const GraphFactor& factor : graph.factors) {
+    const std::uint32_t point = factor.variables[1].index;
+    const double* const variables[] = {
+        graph.frames[factor.variables[0].index].cam_from_world.params.data(),
+        graph.points[point].in_world.data(), graph.blocks[factor.variables[2].index].values.data()};
+    Eigen::Vector2d residual;
+    if (factor.function->Evaluate(variables, residual.data(), nullptr)) {
+      sums[point] += residual.norm();
+      ++counts[point];
+    }
+  }
   for (std::size_t i = 0; i < sums.size(); ++i) {
     model.points[i].error = counts[i] == 0 ? -1 : sums[i] / counts[i];
   }
 }
 
-fs::path write_colmap(ColmapModel model, const FactorGraph& graph, const fs::path& out,
-                      ColmapVariant variant) {
+fs::path write_colmap(ColmapModel model, const std::vector<ColmapCameraPlace>& places,
+                      const FactorGraph& graph, const fs::path& out, ColmapVariant variant) {
   for (std::size_t i = 0; i < model.cameras.size(); ++i) {
-    from_graph(graph.cameras[i].camera, model.cameras[i]);
+    take_colmap_camera(graph, places[i], model.cameras[i]);
   }
   for (std::size_t i = 0; i < model.images.size(); ++i) {
     model.images[i].cam_from_world = graph.frames[i].cam_from_world;
@@ -224,14 +188,15 @@ GraphFile read_colmap(const fs::path& folder, ColmapVariant variant) {
                                                            : read_colmap_binary(folder));
   check_rigs(*model);
   std::vector<std::string> warnings = apply_rigs(*model);
-  GraphFile file = to_graph(*model);
+  std::vector<ColmapCameraPlace> places;
+  GraphFile file = to_graph(*model, places);
   file.warnings = std::move(warnings);
   const auto add_writer = [&](ColmapVariant written) {
     const GraphFormat format =
         written == ColmapVariant::kText ? GraphFormat::kColmapText : GraphFormat::kColmapBinary;
-    file.writers.push_back({format, [model = std::shared_ptr<const ColmapModel>(model), written](
-                                        const FactorGraph& graph, const fs::path& out) {
-                              return write_colmap(*model, graph, out, written);
+    file.writers.push_back({format, [model = std::shared_ptr<const ColmapModel>(model), places,
+                                     written](const FactorGraph& graph, const fs::path& out) {
+                              return write_colmap(*model, places, graph, out, written);
                             }});
   };
   add_writer(variant);

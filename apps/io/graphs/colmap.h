@@ -6,10 +6,9 @@
 namespace hybrid_slam {
 
 // A COLMAP model (folder) as a graph: a frame per image, an observation per point in an image that
-// has a point in space, with the pixel origin moved to the first pixel's centre. SIMPLE_PINHOLE,
-// SIMPLE_RADIAL and RADIAL become Radial, PINHOLE Pinhole, OPENCV_FISHEYE KannalaBrandt. The first
-// image's pose is fixed; focal lengths and the distortion that a model has may be refined, shared
-// by the images of a camera, but not the principal point.
+// has a point in space, with the pixel origin moved to the first pixel's centre; cameras as in
+// colmap_cameras.h. The first image's pose is fixed; focal lengths and the distortion that a model
+// has may be refined, shared by the images of a camera, but not the principal point.
 //
 // Written back: everything that was read, with poses, cameras, points, and the points' mean errors,
 // of the estimate. Frames and rigs rule the images' poses, and images of one frame stay where they

@@ -12,19 +12,6 @@ namespace fs = std::filesystem;
 
 constexpr double kMaxQuaternionError = 1e-2;
 
-// Models that are refused, by number.
-constexpr std::array<std::string_view, 11> kModelNames{"SIMPLE_PINHOLE",
-                                                       "PINHOLE",
-                                                       "SIMPLE_RADIAL",
-                                                       "RADIAL",
-                                                       "OPENCV",
-                                                       "OPENCV_FISHEYE",
-                                                       "FULL_OPENCV",
-                                                       "FOV",
-                                                       "SIMPLE_RADIAL_FISHEYE",
-                                                       "RADIAL_FISHEYE",
-                                                       "THIN_PRISM_FISHEYE"};
-
 // qw qx qy qz tx ty tz.
 Rigid3d read_pose(BinaryScanner& in) {
   const std::uint64_t start = in.at();
@@ -45,11 +32,7 @@ ColmapCameraKind read_kind(BinaryScanner& in) {
     if (static_cast<std::int32_t>(kind.model) == model) return kind;
     known += fmt::format("{}{}", known.empty() ? "" : ", ", kind.name);
   }
-  const auto index = static_cast<std::size_t>(model);
-  const std::string name = model >= 0 && index < kModelNames.size()
-                               ? std::string(kModelNames[index])
-                               : std::to_string(model);
-  in.fail_at(start, fmt::format("camera model {} is not supported: {} are", name, known));
+  in.fail_at(start, fmt::format("camera model {} is not supported: {} are", model, known));
 }
 
 std::uint64_t read_size(BinaryScanner& in) {

@@ -20,11 +20,18 @@ namespace hybrid_slam {
 enum class ColmapVariant { kText, kBinary };
 
 enum class ColmapCameraModel : std::int32_t {
-  kSimplePinhole = 0,  // f, cx, cy
-  kPinhole = 1,        // fx, fy, cx, cy
-  kSimpleRadial = 2,   // f, cx, cy, k
-  kRadial = 3,         // f, cx, cy, k1, k2
-  kOpencvFisheye = 5,  // fx, fy, cx, cy, k1, k2, k3, k4
+  kSimplePinhole = 0,        // f, cx, cy
+  kPinhole = 1,              // fx, fy, cx, cy
+  kSimpleRadial = 2,         // f, cx, cy, k
+  kRadial = 3,               // f, cx, cy, k1, k2
+  kOpencv = 4,               // fx, fy, cx, cy, k1, k2, p1, p2
+  kOpencvFisheye = 5,        // fx, fy, cx, cy, k1, k2, k3, k4
+  kFullOpencv = 6,           // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6
+  kFov = 7,                  // fx, fy, cx, cy, omega
+  kSimpleRadialFisheye = 8,  // f, cx, cy, k
+  kRadialFisheye = 9,        // f, cx, cy, k1, k2
+  kThinPrismFisheye = 10,    // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
+  kRadTanThinPrism = 11,     // 16: carried along where no image uses it
 };
 
 struct ColmapCameraKind {
@@ -33,12 +40,19 @@ struct ColmapCameraKind {
   std::size_t params = 0;
 };
 
-inline constexpr std::array<ColmapCameraKind, 5> kColmapCameraKinds{
+inline constexpr std::array<ColmapCameraKind, 12> kColmapCameraKinds{
     {{ColmapCameraModel::kSimplePinhole, "SIMPLE_PINHOLE", 3},
      {ColmapCameraModel::kPinhole, "PINHOLE", 4},
      {ColmapCameraModel::kSimpleRadial, "SIMPLE_RADIAL", 4},
      {ColmapCameraModel::kRadial, "RADIAL", 5},
-     {ColmapCameraModel::kOpencvFisheye, "OPENCV_FISHEYE", 8}}};
+     {ColmapCameraModel::kOpencv, "OPENCV", 8},
+     {ColmapCameraModel::kOpencvFisheye, "OPENCV_FISHEYE", 8},
+     {ColmapCameraModel::kFullOpencv, "FULL_OPENCV", 12},
+     {ColmapCameraModel::kFov, "FOV", 5},
+     {ColmapCameraModel::kSimpleRadialFisheye, "SIMPLE_RADIAL_FISHEYE", 4},
+     {ColmapCameraModel::kRadialFisheye, "RADIAL_FISHEYE", 5},
+     {ColmapCameraModel::kThinPrismFisheye, "THIN_PRISM_FISHEYE", 12},
+     {ColmapCameraModel::kRadTanThinPrism, "RAD_TAN_THIN_PRISM_FISHEYE", 16}}};
 
 struct ColmapCamera {
   std::uint32_t id = 0;

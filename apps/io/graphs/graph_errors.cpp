@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "apps/io/graphs/model_reprojection.h"
+
 namespace hybrid_slam {
 
 std::optional<double> squared_error(const FactorGraph& graph, const GraphObservation& observation) {
@@ -27,6 +29,20 @@ std::map<std::string, ReprojectionError> reprojection_errors(const FactorGraph& 
     if (const auto squared = squared_error(graph, observation)) {
       ++error.observations;
       error.rmse += *squared;
+    }
+  }
+  for (const GraphFactor& factor : graph.factors) {
+    const auto* const named = dynamic_cast<const NamedReprojection*>(factor.function.get());
+    if (named == nullptr) continue;
+    const double* const variables[] = {
+        graph.frames[factor.variables[0].index].cam_from_world.params.data(),
+        graph.points[factor.variables[1].index].in_world.data(),
+        graph.blocks[factor.variables[2].index].values.data()};
+    ReprojectionError& error = errors[std::string(named->model_name())];
+    Eigen::Vector2d residual;
+    if (factor.function->Evaluate(variables, residual.data(), nullptr)) {
+      ++error.observations;
+      error.rmse += residual.squaredNorm();
     }
   }
   for (auto& [name, error] : errors) {
