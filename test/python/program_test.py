@@ -1,0 +1,50 @@
+"""Ten lines of Python give the same bytes as the program, on real images; and the example scripts run."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from support import hs
+
+DATA = os.environ.get("HYBRID_SLAM_DATA")
+if not DATA:
+    print("SKIPPED: HYBRID_SLAM_DATA is not set")
+    sys.exit(0)
+
+
+class Program(unittest.TestCase):
+    def test_kitti(self) -> None:
+        dataset = os.path.join(DATA, "kitti")
+        with tempfile.TemporaryDirectory() as folder:
+            ours, theirs = os.path.join(folder, "python"), os.path.join(folder, "program")
+            program = os.environ["HYBRID_SLAM_PROGRAM"]
+            subprocess.run([program, dataset, "--out", theirs, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+            os.makedirs(ours)
+            sequence = hs.open_sequence(dataset)
+            session = hs.Session(sequence.rig, mode="every-frame")
+            for frame in sequence:
+                session.push_stereo(frame.time, frame.left, frame.right)
+            session.finish()
+            session.trajectory().write_tum(os.path.join(ours, "stereo.tum"))
+            session.trajectory(online=True).write_tum(os.path.join(ours, "stereo_online.tum"))
+            for name in ("stereo.tum", "stereo_online.tum"):
+                with open(os.path.join(ours, name)) as one, open(os.path.join(theirs, name)) as other:
+                    text = one.read()
+                    self.assertEqual(text, other.read())
+                self.assertEqual(text.count("\n"), len(sequence))
+            self.assertLess(hs.ate(session.trajectory(), sequence.truth).position.rmse, 0.2)
+            self.run_example("evaluate.py", os.path.join(ours, "stereo.tum"), os.path.join(theirs, "stereo.tum"))
+
+    def test_own_factor(self) -> None:
+        self.assertIn("beacon at", self.run_example("own_factor.py"))
+
+    def run_example(self, name: str, *arguments: str) -> str:
+        script = os.path.join(os.environ["HYBRID_SLAM_EXAMPLES"], name)
+        done = subprocess.run([sys.executable, script, *arguments], check=True, capture_output=True, text=True)
+        return done.stdout
+
+
+if __name__ == "__main__":
+    unittest.main()
