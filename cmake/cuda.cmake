@@ -4,7 +4,6 @@
 set(HYBRID_SLAM_CUDA AUTO CACHE STRING "SIFT on CUDA devices: AUTO, ON or OFF")
 set_property(CACHE HYBRID_SLAM_CUDA PROPERTY STRINGS AUTO ON OFF)
 
-set(HS_WITH_CUDA OFF)
 if(HYBRID_SLAM_CUDA STREQUAL "AUTO")
   if(EXISTS /proc/driver/nvidia/version OR EXISTS /dev/nvidiactl OR EXISTS /dev/dxg)
     include(CheckLanguage)

@@ -1,7 +1,12 @@
-# cmake -D SOURCE=... -D HYBRID_SLAM_VERSION=... -D TEMPLATE=... -D OUTPUT=... -P git_version.cmake
+# cmake -D SOURCE=... -D HYBRID_SLAM_VERSION=... -D HYBRID_SLAM_FEATURES=... -D TEMPLATE=... -D OUTPUT=...
+#       -P git_version.cmake
 execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12
   OUTPUT_VARIABLE HYBRID_SLAM_GIT_COMMIT OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 if(NOT HYBRID_SLAM_GIT_COMMIT)
   set(HYBRID_SLAM_GIT_COMMIT unknown)
 endif()
+string(REGEX MATCH "([0-9]+)\\.([0-9]+)\\.([0-9]+)" _ ${HYBRID_SLAM_VERSION})
+set(HYBRID_SLAM_VERSION_MAJOR ${CMAKE_MATCH_1})
+set(HYBRID_SLAM_VERSION_MINOR ${CMAKE_MATCH_2})
+set(HYBRID_SLAM_VERSION_PATCH ${CMAKE_MATCH_3})
 configure_file(${TEMPLATE} ${OUTPUT} @ONLY)

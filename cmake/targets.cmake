@@ -1,8 +1,16 @@
 # The one way to declare a target of ours. Includes are written from the repository's root.
 
 add_library(hs_options INTERFACE)
-target_compile_options(hs_options INTERFACE -Wall -Wextra -Wconversion -Wshadow=local -Werror)
-target_include_directories(hs_options INTERFACE ${CMAKE_SOURCE_DIR})
+if(PROJECT_IS_TOP_LEVEL AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")  # clang, for test/fuzz alone, warns of other things
+  target_compile_options(hs_options INTERFACE -Wall -Wextra -Wconversion -Wshadow=local -Werror)
+endif()
+target_include_directories(hs_options INTERFACE ${PROJECT_SOURCE_DIR})
+# Every object may go into a shared library (the Python module). All of them alike: they share precompiled
+# headers. Nothing of ours is replaced at load time, so calls may still be inlined.
+target_compile_options(hs_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fPIC -fno-semantic-interposition>)
+
+# Where headers of ours find one another: under the repository's root, or where it is installed.
+set(HS_INCLUDES $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/hybrid_slam>)
 
 # The system's BLAS before all others: Debian's libceres asks for ATLAS by name, and CHOLMOD, which
 # calls whatever is found first, would take that too.
@@ -10,7 +18,7 @@ set(HS_BLAS_FIRST LINKER:--push-state,--no-as-needed,${BLAS_LIBRARY},--pop-state
 
 # Headers that nearly every source reads, parsed once per build: a good part of a clean build's time.
 # Sources include what they use all the same; the preset dev, which does without, sees to it.
-option(HYBRID_SLAM_PRECOMPILED_HEADERS "Parse the headers of other libraries once" ON)
+option(HYBRID_SLAM_PRECOMPILED_HEADERS "Parse the headers of other libraries once" ${PROJECT_IS_TOP_LEVEL})
 if(HYBRID_SLAM_PRECOMPILED_HEADERS AND CCACHE_PROGRAM)
   target_compile_options(hs_options INTERFACE -fpch-preprocess)  # without it ccache must give up
 endif()
@@ -19,8 +27,10 @@ endif()
 function(hs_precompiled name)
   cmake_parse_arguments(ARG "" "" "HEADERS;DEPENDS" ${ARGN})
   if(HYBRID_SLAM_PRECOMPILED_HEADERS)
-    file(WRITE ${CMAKE_BINARY_DIR}/empty.cpp "")
-    add_library(${name} STATIC ${CMAKE_BINARY_DIR}/empty.cpp)
+    if(NOT EXISTS ${PROJECT_BINARY_DIR}/empty.cpp)
+      file(WRITE ${PROJECT_BINARY_DIR}/empty.cpp "")
+    endif()
+    add_library(${name} STATIC ${PROJECT_BINARY_DIR}/empty.cpp)
     target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS})
     target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
   endif()
@@ -49,13 +59,13 @@ function(hs_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
-    target_link_libraries(${name} PRIVATE hs_options PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
-    target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+    target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:hs_options> PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
+    target_include_directories(${name} PUBLIC ${HS_INCLUDES})
     hs_use_precompiled(${name} hs_common_headers)
   else()
     add_library(${name} INTERFACE)
     target_link_libraries(${name} INTERFACE ${ARG_DEPENDS})
-    target_include_directories(${name} INTERFACE ${CMAKE_SOURCE_DIR})
+    target_include_directories(${name} INTERFACE ${HS_INCLUDES})
   endif()
 endfunction()
 
@@ -69,10 +79,11 @@ function(hs_program name)
 endfunction()
 
 # hs_test(name SOURCES a_test.cpp ... DEPENDS ...): a Catch2 program whose cases become CTest tests.
-# Cases tagged [slow], in a program declared SLOW, get the label "slow", all others "ci". A case that
+# Cases tagged [slow], in a program declared SLOW, get the label "slow" (with BY_HAND: "by_hand", see
+# CONTRIBUTING.md), all others "ci". A case that
 # needs the shared data and does not find it prints "SKIPPED" and is reported as skipped.
 function(hs_test name)
-  cmake_parse_arguments(ARG "SLOW" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "SLOW;BY_HAND" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_options(${name} PRIVATE ${HS_BLAS_FIRST})
   target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS} hs_catch_main Ceres::ceres)
@@ -80,7 +91,11 @@ function(hs_test name)
   set(skip SKIP_REGULAR_EXPRESSION "SKIPPED: ")
   catch_discover_tests(${name} TEST_SPEC "~[slow]" PROPERTIES LABELS ci ${skip} TIMEOUT 300)
   if(ARG_SLOW)
-    catch_discover_tests(${name} TEST_SPEC "[slow]" TEST_SUFFIX " (slow)" PROPERTIES LABELS slow ${skip} TIMEOUT 3600)
+    set(label slow)
+    if(ARG_BY_HAND)
+      set(label by_hand)
+    endif()
+    catch_discover_tests(${name} TEST_SPEC "[slow]" TEST_SUFFIX " (slow)" PROPERTIES LABELS ${label} ${skip} TIMEOUT 3600)
   endif()
 endfunction()
 

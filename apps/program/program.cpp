@@ -7,6 +7,7 @@
 #include <atomic>
 #include <csignal>
 
+#include "apps/slam/version.h"
 #include "cameras/files/input_error.h"
 #include "cameras/files/output_file.h"
 
@@ -42,12 +43,14 @@ int run_program(const std::string& name, const std::function<int()>& body) {
 
 std::optional<int> parse_line(CLI::App& app, int argc, char** argv,
                               const std::function<void()>& check) {
+  app.set_version_flag("--version", app.get_name() + ' ' + kVersion + "\ncommit " + kGitCommit +
+                                        "\nfeatures " + kFeatures);
   try {
     app.parse(argc, argv);
     if (check) check();
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
     spdlog::error("{} (--help tells more)", error.what());
     return kExitBadUsage;
   }

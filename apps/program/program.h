@@ -9,7 +9,7 @@ class App;
 }
 
 // What every program does alike: its exit codes, its one line per error, its command line's end,
-// the first Ctrl-C.
+// --version, the first Ctrl-C.
 
 namespace hybrid_slam {
 
@@ -28,8 +28,8 @@ enum ExitCode : int {
 int run_program(const std::string& name, const std::function<int()>& body);
 
 // Parses the command line, then calls `check`, which may throw CLI::ValidationError where values do
-// not go together. Empty if the program shall go on, else the exit code to end with: --help, or bad
-// usage, which has been reported.
+// not go together. Empty if the program shall go on, else the exit code to end with: --help,
+// --version, or bad usage, which has been reported.
 std::optional<int> parse_line(CLI::App& app, int argc, char** argv,
                               const std::function<void()>& check = {});
 
