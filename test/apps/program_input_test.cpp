@@ -86,7 +86,7 @@ TEST_CASE("a dataset that cannot be used is refused with one line and code 3") {
   SECTION("a file") {
     fs::remove_all(data);
     write_text(data, "x");
-    reason = "data: no such folder";
+    reason = "data: no bag: neither ROS 1, MCAP nor rosbag2's sqlite3";
   }
   SECTION("no images") {
     for (int i = 0; i < kSurveyFrames; ++i) {

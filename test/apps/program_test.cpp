@@ -21,8 +21,10 @@ using Json = nlohmann::json;
 
 constexpr double kMaxAte = 0.003;  // [m]; the path is 1.6 m long, the ground 2 m away
 constexpr const char* kResults[] = {
-    "stereo.tum", "stereo_online.tum", "map.hslam",  "map.ply",      "map.png",
-    "loops.csv",  "timing.json",       "timing.csv", "summary.json", "frames.csv"};
+    "stereo.tum",    "stereo_online.tum", "map.hslam",       "map.ply",
+    "map.png",       "loops.csv",         "timing.json",     "timing.csv",
+    "summary.json",  "frames.csv",        "errors.csv",      "keyframes.csv",
+    "residuals.csv", "coverage.csv",      "calibration.csv", "report.html"};
 
 std::string engine_by_default() {
   return to_string(why_no_cuda_sift({}).empty() ? SiftDevice::kCuda : SiftDevice::kCpu);
@@ -122,6 +124,12 @@ TEST_CASE("hybrid_slam tracks a survey and writes what it documents") {
     CHECK(times["p99"].get<double>() <= times["max"].get<double>());
   }
   CHECK(timing["track"]["count"] == kSurveyFrames);
+  CHECK(summary["options_changed"]["features"] == "400");
+  CHECK(summary["images_xxh3"].get<std::string>().size() == 16);
+  CHECK(summary["residuals"]["stereo"]["rms_px"].get<double>() < 1);
+  CHECK(summary["coverage"]["area_m2"].get<double>() > 0);
+  CHECK(count_lines(read_text(out / "errors.csv"), "stereo,") == kSurveyFrames);
+  CHECK(fs::file_size(out / "report.html") < 5'000'000);
   check_frame_times(out, summary["seconds"].get<double>());
 }
 
@@ -166,6 +174,8 @@ TEST_CASE("every-frame runs give the same bytes, whatever the number of threads"
         run_slam(folder.path(), "data", {"--quiet", "--threads", threads, "--out", threads}).code ==
         0);
   }
+  CHECK(read_json(folder.path() / "1/summary.json")["images_xxh3"] ==
+        read_json(folder.path() / "3/summary.json")["images_xxh3"]);
   for (const char* const file : {"stereo.tum", "stereo_online.tum", "map.ply", "map.hslam"}) {
     INFO(file);
     CHECK(read_text(folder.path() / "1" / file) == read_text(folder.path() / "3" / file));

@@ -9,6 +9,7 @@
 
 #include "backend/incremental/incremental_solver.h"
 #include "cameras/geometry/se3.h"
+#include "cameras/geometry/uncertain_motion.h"
 #include "factors/linear_prior.h"
 #include "factors/manifolds.h"
 #include "test/support/factor_check.h"
@@ -178,7 +179,7 @@ TEST_CASE("A window loses nothing of a nearly linear graph") {
 // Normalised error of a pose's estimate, chi2 of 6 degrees of freedom if its covariance is right.
 double normalized_error(const IncrementalSolver& solver, std::uint32_t pose, const Rigid3d& truth) {
   const Vector6d error = se3_log(truth * inverse(solver.pose(pose)));
-  return error.dot(solver.covariance(pose).ldlt().solve(error));
+  return squared_mahalanobis(error, solver.covariance(pose));
 }
 
 // Mean over runs of a chi2 of 6 degrees of freedom, in its two-sided 95 % band (normal

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 
 #include "cameras/geometry/se3.h"
+#include "cameras/geometry/uncertain_motion.h"
 #include "test/support/synthetic_scene.h"
 
 namespace hybrid_slam {
@@ -129,7 +130,7 @@ double GrownWeakGround::mahalanobis2(const MapSnapshot& map) const {
                            inverse(map.at(keyframes_[kWeak - 1]).cam_from_world);
   const Rigid3d motion = truth_[kWeak] * inverse(truth_[kWeak - 1]);
   const Vector6d off = se3_log(estimate * inverse(motion));
-  return off.dot(weak_ground_covariance().ldlt().solve(off));
+  return squared_mahalanobis(off, weak_ground_covariance());
 }
 
 }  // namespace hybrid_slam

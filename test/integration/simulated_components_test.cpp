@@ -4,23 +4,30 @@
 
 #include "backend/map/components.h"
 #include "test/integration/simulated_runs.h"
+#include "test/support/random.h"
 
 namespace hybrid_slam {
 namespace {
 
 constexpr std::size_t kDark = 15;  // 1.5 s: longer than constant velocity is believed
 
-// A third of a lap, dark, then from half of the lap on until `last`.
-SimulatedSource interrupted_lap(std::size_t last, std::uint64_t seed) {
+struct Gap {
+  std::size_t begin = 20;  // frames of the lap before it
+  std::size_t dark = kDark;
+  std::size_t end = 30;  // where on the lap it is light again
+};
+
+// A part of a lap, dark, then from elsewhere on the lap on until `last`.
+SimulatedSource interrupted_lap(std::size_t last, std::uint64_t seed, const Gap& gap = {}) {
   SyntheticSceneOptions options = orbit_of(2 * kOrbitFrames);
   options.seed = seed;
   SimulatedSource source(make_synthetic_scene(options));
-  for (std::size_t i = 0; i < 20; ++i) source.order.push_back(i);
-  for (std::size_t i = 0; i < kDark; ++i) {
+  for (std::size_t i = 0; i < gap.begin; ++i) source.order.push_back(i);
+  for (std::size_t i = 0; i < gap.dark; ++i) {
     source.blank.insert(source.order.size());
-    source.order.push_back(20);
+    source.order.push_back(gap.begin);
   }
-  for (std::size_t i = 30; i < last; ++i) source.order.push_back(i);
+  for (std::size_t i = gap.end; i < last; ++i) source.order.push_back(i);
   return source;
 }
 
@@ -89,6 +96,30 @@ TEST_CASE("Components are joined when the vehicle comes back", "[integration]") 
       CHECK(worst_error(result, source) < 0.5);
       CHECK(faults_of(*result.map) == "");
     }
+  }
+}
+
+TEST_CASE("Of twenty gaps all are joined, and none before the places meet", "[integration][slow]") {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    Gap gap;
+    gap.begin = 12 + random.bits() % 6;
+    gap.dark = kDark + random.bits() % 30;          // 1.5 to 4.5 s
+    gap.end = gap.begin + 16 + random.bits() % 10;  // 5 to 8 m further on
+    INFO("seed " << seed << ": " << gap.begin << " frames, dark " << gap.dark << ", on from "
+                 << gap.end);
+    // A view is 3.2 m long: at 0.31 m per frame the end of the lap shares 30 % with its beginning
+    // from 7 frames before it on. 2 s later is 13 frames behind it.
+    const SimulatedSource back = interrupted_lap(kOrbitFrames + 13, 100 + seed, gap);
+    const RunResult joined = run(back, false);
+    CHECK(joined.components == 1);
+    CHECK(joined.frames.other_components == 0);
+    CHECK(joined.frames.tracked == static_cast<int>(back.size() - gap.dark));
+    CHECK(worst_error(joined, back, back.size() - 10) < 0.05);
+    CHECK(faults_of(*joined.map) == "");
+
+    const SimulatedSource away = interrupted_lap(kOrbitFrames - 12, 100 + seed, gap);
+    CHECK(run(away, false).components == 2);
   }
 }
 

@@ -161,7 +161,9 @@ TEST_CASE("With a rate, images that come too early are dropped and counted", "[i
   const RunResult result = run_realtime(source, slam_options(), run, {});
   CHECK(result.frames.dropped > 0);
   CHECK(result.frames.read + result.frames.dropped == 60);
-  CHECK(result.frames.tracked + result.frames.lost == result.frames.read);
+  // Between two frames that are far apart the camera may have to coast.
+  const FrameCounts& frames = result.frames;
+  CHECK(frames.tracked + frames.coasted + frames.other_components + frames.lost == frames.read);
 }
 
 TEST_CASE("A run can be cancelled at any frame and keeps what it has", "[integration]") {

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 
 #include "backend/backend.h"
+#include "cameras/geometry/uncertain_motion.h"
 #include "frontend/mapping/culling.h"
 #include "frontend/mapping/fusion.h"
 #include "frontend/mapping/triangulation.h"
@@ -82,7 +83,7 @@ TrackedMoment track_scene(const SyntheticScene& scene) {
 
 double normalized_error(const UncertainMotion& estimate, const Rigid3d& truth) {
   const Vector6d off = se3_log(truth * inverse(estimate.b_from_a));
-  return off.dot(estimate.covariance.ldlt().solve(off)) / 6;
+  return squared_mahalanobis(off, estimate.covariance) / 6;
 }
 
 }  // namespace hybrid_slam

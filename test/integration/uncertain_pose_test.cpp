@@ -145,8 +145,9 @@ Eigen::MatrixXd covariance_of_points(const Optimised& world) {
 }
 
 // The largest and smallest ratio of the variances that two covariances have of anything.
-Eigen::Vector2d variance_ratios(const Matrix6d& a, const Matrix6d& b) {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> solver(a, b, Eigen::EigenvaluesOnly);
+Eigen::Vector2d variance_ratios(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(a, b,
+                                                                         Eigen::EigenvaluesOnly);
   return {solver.eigenvalues().minCoeff(), solver.eigenvalues().maxCoeff()};
 }
 

@@ -231,7 +231,7 @@ TEST_CASE("COLMAP: a stale model of the cases is the consistent one") {
 
 TEST_CASE("COLMAP text: what is refused") {
   check_faults(kModel, "cameras.txt", "",
-               {{"model", "4 PINHOLE", "4 OPENCV", ":2: camera model \"OPENCV\" is not supported"},
+               {{"model", "4 PINHOLE", "4 LENS", ":2: camera model \"LENS\" is not supported"},
                 {"truncated", " -0.1 0.02\n", " -0.1\n", ":5: parameter is missing"},
                 {"too many", " -0.1 0.02\n", " -0.1 0.02 1\n", ":5: expected the end of the line"},
                 {"the same id", "1 SIMPLE", "4 SIMPLE", ":3: camera 4 is there already"},
@@ -317,7 +317,7 @@ TEST_CASE("COLMAP binary: values that are refused") {
     write_text(model / name, whole);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  refused("cameras.bin", 8 + 4, std::int32_t{4}, "camera model OPENCV is not supported");
+  refused("cameras.bin", 8 + 4, std::int32_t{99}, "camera model 99 is not supported");
   refused("cameras.bin", 8 + 4, std::int32_t{-1}, "camera model -1 is not supported");
   refused("cameras.bin", 8 + 8, std::uint64_t{1} << 40, "the image is too large");
   refused("cameras.bin", 8 + 24, nan, "byte 32: a number that is not finite");

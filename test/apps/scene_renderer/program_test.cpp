@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "apps/io/trajectory.h"
@@ -121,6 +122,77 @@ TEST_CASE("another visit is told, and its truth is in the same world as the firs
   }
 }
 
+TEST_CASE("frames that are missing or doubled leave all others as they are, and are told") {
+  const TempFolder folder;
+  const auto with = [&](const std::string& out, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{
+        out, "--quiet", "--kind", "survey",   "--frames", "12",           "--width",
+        "2", "--seed",  "5",      "--format", "png",      "--resolution", "96x72"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    REQUIRE(render(folder.path(), arguments).code == 0);
+    return content_of(folder.path() / out / "stereo");
+  };
+  const auto plain = with("plain", {}), zero = with("zero", {"--drop", "0", "--arm", "0"});
+  CHECK((plain == zero));
+  const auto holes = with("holes", {"--drop", "30", "--double", "30"});
+  Conditions conditions;
+  conditions.dropped = conditions.doubled = 30;
+  const auto fates = frame_fates(conditions, 12, 5);
+  REQUIRE(fates.size() < 12);
+  const auto truth = read_trajectory(folder.path() / "holes/stereo/gt_left_tum.txt").poses;
+  REQUIRE(truth.size() == fates.size());
+  int doubled = 0;
+  for (std::size_t i = 0; i < fates.size(); ++i) {
+    const std::string picture = std::to_string(fates[i].picture);
+    for (const char* const camera : {"_0.png", "_1.png"}) {
+      CHECK((holes.at("images/" + std::to_string(i) + camera) ==
+             plain.at("images/" + picture + camera)));
+    }
+    CHECK(truth[i].time == Approx(fates[i].moment / 5.0).margin(1e-6));
+    doubled += fates[i].picture != fates[i].moment;
+  }
+  CHECK(doubled > 0);
+  const auto scene = nlohmann::json::parse(holes.at("scene.json"));
+  CHECK(scene["dropped_moments"].size() == 12 - fates.size());
+  CHECK(scene["doubled_frames"].size() == static_cast<std::size_t>(doubled));
+  CHECK(scene["conditions"]["dropped_percent"] == 30);
+  CHECK_FALSE(nlohmann::json::parse(plain.at("scene.json")).contains("conditions"));
+}
+
+TEST_CASE("calibration files tell the nominal cameras, a file of its own the true ones") {
+  const TempFolder folder;
+  REQUIRE(render(folder.path(), small("plain", {})).code == 0);
+  REQUIRE(
+      render(folder.path(), small("wrong", {"--miscalibrate", "pitch=0.2,focal=-0.5,flat-port=20"}))
+          .code == 0);
+  const auto plain = content_of(folder.path() / "plain/hybrid");
+  const auto wrong = content_of(folder.path() / "wrong/hybrid");
+  for (const char* const file : {"left_camera.yaml", "right_camera.yaml", "fisheye_calib.yaml"}) {
+    CHECK(plain.at(std::string("calibration/") + file) ==
+          wrong.at(std::string("calibration/") + file));
+  }
+  CHECK((plain.at("hybrid/gt_left_tum.txt") == wrong.at("hybrid/gt_left_tum.txt")));
+  CHECK((plain.at("hybrid/images/raw/1_left.jpg") != wrong.at("hybrid/images/raw/1_left.jpg")));
+  CHECK((plain.at("hybrid/images/raw/1_fish.jpg") == wrong.at("hybrid/images/raw/1_fish.jpg")));
+  CHECK(plain.count("hybrid/true_cameras.json") == 0);
+  const auto truth = nlohmann::json::parse(wrong.at("hybrid/true_cameras.json"));
+  CHECK(truth["left"]["fx"].get<double>() == Approx(0.995 * 858.35 * 96 / 1024));
+  CHECK(truth["left_from_right_rotation"][2][1].get<double>() == Approx(std::sin(0.2 * 0.0174533)));
+  CHECK(truth["flat_port"]["distance_m"].get<double>() == Approx(0.02));
+}
+
+TEST_CASE("masks of arm and dirt lie beside the images") {
+  const TempFolder folder;
+  REQUIRE(render(folder.path(), small("a", {"--preset", "arm", "--dirt", "20"})).code == 0);
+  const auto files = content_of(folder.path() / "a/hybrid/hybrid");
+  for (const char* const name : {"0_left", "0_right", "2_fish", "port_left", "port_fish"}) {
+    CHECK(files.count("masks/" + std::string(name) + ".png") == 1);
+  }
+  const auto scene = nlohmann::json::parse(files.at("scene.json"));
+  CHECK(scene["conditions"]["arm_percent"] == 30);
+  CHECK(scene["left"]["arm_share"].size() == 3);
+}
+
 TEST_CASE("sequences share a folder if their cameras agree, and none is overwritten") {
   const TempFolder folder;
   const auto frame = [](const std::string& name, const std::string& size) {
@@ -156,6 +228,17 @@ TEST_CASE("bad command lines and folders end in one line") {
   refused({"a", "--threads", "0"}, 2, "--threads");
   refused({"a", "--sequence", "../b"}, 2, "\"../b\" is no name of a sequence");
   refused({"a", "--unknown"}, 2, "--unknown");
+  refused({"a", "--exposure-time", "nan"}, 2, "--exposure-time: is not between 0 and 10 S");
+  refused({"a", "--photons", "-1"}, 2, "--photons: is not between");
+  refused({"a", "--drop", "95"}, 2, "--drop: is not between");
+  refused({"a", "--ground", "lava"}, 2, "--ground");
+  for (const char* const spell : {"3", "3:", ":3", "3:0", "-1:3", "3:x", "nan:1", "3:1:2"}) {
+    refused({"a", "--lamps-off", spell}, 2, "--lamps-off: \"" + std::string(spell) + "\" is no");
+    refused({"a", "--silt", spell}, 2, "--silt: \"" + std::string(spell) + "\" is no");
+  }
+  for (const char* const error : {"pitch", "pitch=", "pitch=3", "tilt=1", "focal=nan", "=1"}) {
+    refused({"a", "--miscalibrate", error}, 2, "--miscalibrate: \"" + std::string(error) + "\"");
+  }
   for (const char* const size :
        {"640", "640x", "x480", "640x480x3", "0x480", "-640x480", "1e3x480", "640x99999999999"}) {
     refused({"a", "--resolution", size}, 2, "is no size like 1024x768");

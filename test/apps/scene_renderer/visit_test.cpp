@@ -209,7 +209,7 @@ TEST_CASE("each visit meets other snow and has noise of its own") {
     const ViewRays rays = make_view_rays(left_camera(quiet), kPinholeHalfAngle, 2);
     SceneMoment moment;
     moment.lighting.lamps = lamps_at(options, rig);
-    RadianceImage image{rays.width, rays.height, {}, {}};
+    RadianceImage image{rays.width, rays.height, {}, {}, {}};
     image.pixels.assign(rays.bearing.size(), Color::Zero());
     image.distance.assign(rays.bearing.size(), 1.3F);  // the ground hides what is beyond
     draw_snow(quiet.options().snow, moment, left_camera(quiet), rays, rig.world_from_left, rig.time,

@@ -155,7 +155,8 @@ def incremental_case(path, kind):
                   Peer("gtsam 4.2, ISAM2", "gtsam42", "gtsam_isam2.py", kind)]
 
 
-BATCH = [*map(pose_graph_case, ["sphere2500", "torus3D", "parking-garage", "smallGrid3D"]),
+BATCH = [*map(pose_graph_case, ["sphere2500", "torus3D", "parking-garage", "smallGrid3D",
+                               "cubicle"]),
          *map(bundle_case, ["trafalgar-21-11315-pre", "survey-150-pre", "problem-49-7776-pre"]),
          stereo_case("gtsam/VO_stereo_factors_large.txt", "stereo-graph"),
          stereo_case("stereo_seq/survey-150-stereo.seq", "stereo-stream")]

@@ -287,6 +287,13 @@ double largest_difference(const std::array<double, A::kParamCount>& a,
 
 }  // namespace
 
+TEST_CASE("Fisheye: words of a file stand in one line of an error") {
+  CHECK(
+      fisheye_error("cam0:\n  camera_model: \"pin\\nhole\"\n  distortion_model: none\n"
+                    "  resolution: [4, 4]\n") ==
+      "fish.yaml:2: cam0.camera_model: 'pin?hole' is not supported (pinhole, ds, eucm, omni are)");
+}
+
 TEST_CASE("Fisheye: formats of ORB-SLAM3, stella_vslam, Basalt and ROS 2") {
   const std::string orbslam3 =
       "%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"KannalaBrandt8\"\nCamera1.fx: 302.7\n"

@@ -2,10 +2,12 @@
 #include <sstream>
 
 #include <catch2/catch.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "cameras/geometry/rigid3d.h"
 #include "cameras/kannala_brandt.h"
 #include "test/frontend/input/dataset_writer.h"
+#include "test/support/shared_cases.h"
 
 namespace hybrid_slam {
 namespace {
@@ -137,6 +139,30 @@ Eigen::Vector2d blob_centre(const GrayImage& image, Eigen::Vector2d guess) {
   return guess;
 }
 
+// Points of the scene lie in the images where rectified cameras on the true path see them [px].
+void check_points(const ImageSequence& sequence, double tolerance) {
+  const SequenceInfo& info = sequence.info();
+  const auto [fx, fy, cx, cy, baseline] = info.stereo.params;
+  int seen = 0;
+  for (const StampedPose& truth : {info.truth[0], info.truth[4]}) {
+    const auto frame = std::find(info.times.begin(), info.times.end(), truth.time);
+    REQUIRE(frame != info.times.end());
+    const FrameImages images = sequence.read(static_cast<std::size_t>(frame - info.times.begin()));
+    for (const Eigen::Vector3d& point_in_world : scene()) {
+      const Eigen::Vector3d point = inverse(truth.world_from_cam) * point_in_world;
+      const Eigen::Vector2d left(fx * point.x() / point.z() + cx, fy * point.y() / point.z() + cy);
+      const Eigen::Vector2d right(left.x() - fx * baseline / point.z(), left.y());
+      if (right.x() < 12 || left.x() > kWidth - 12 || left.y() < 12 || left.y() > kHeight - 12) {
+        continue;
+      }
+      ++seen;
+      CHECK((blob_centre(images.left, left) - left).norm() < tolerance);
+      CHECK((blob_centre(images.right, right) - right).norm() < tolerance);
+    }
+  }
+  CHECK(seen > 20);
+}
+
 TEST_CASE("EuRoC images are rectified: points fall where the calibration and the truth say") {
   const TempFolder folder;
   write_euroc(folder.path());
@@ -152,25 +178,59 @@ TEST_CASE("EuRoC images are rectified: points fall where the calibration and the
   CHECK(fx == fy);
   REQUIRE(info.truth.size() == kFrames - 1);  // none for the first frame
   CHECK(info.truth_has_rotation);
+  check_points(*sequence, 0.08);
+}
 
-  int seen = 0;
-  for (const StampedPose& truth : {info.truth[0], info.truth[4]}) {
-    const auto frame = std::find(info.times.begin(), info.times.end(), truth.time);
-    REQUIRE(frame != info.times.end());
-    const FrameImages images = sequence->read(static_cast<std::size_t>(frame - info.times.begin()));
-    for (const Eigen::Vector3d& point_in_world : scene()) {
-      const Eigen::Vector3d point = inverse(truth.world_from_cam) * point_in_world;
-      const Eigen::Vector2d left(fx * point.x() / point.z() + cx, fy * point.y() / point.z() + cy);
-      const Eigen::Vector2d right(left.x() - fx * baseline / point.z(), left.y());
-      if (right.x() < 12 || left.x() > kWidth - 12 || left.y() < 12 || left.y() > kHeight - 12) {
-        continue;
-      }
-      ++seen;
-      CHECK((blob_centre(images.left, left) - left).norm() < 0.08);
-      CHECK((blob_centre(images.right, right) - right).norm() < 0.08);
-    }
+TEST_CASE("EuRoC cameras of unequal size become a pair of the left one's") {
+  const TempFolder folder;
+  write_euroc(folder.path());
+  const fs::path camera = folder.path() / "mav0/cam1";
+  for (const auto& entry : fs::directory_iterator(camera / "data")) {
+    cv::Mat half;
+    cv::resize(cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE), half, {}, 0.5, 0.5,
+               cv::INTER_AREA);
+    write_picture(entry.path(), half);
   }
-  CHECK(seen > 20);
+  RawModel m = raw_model(1);
+  m.f /= 2;
+  m.cx = (m.cx + 0.5) / 2 - 0.5;
+  m.cy = (m.cy + 0.5) / 2 - 0.5;
+  write_text(camera / "sensor.yaml", sensor_yaml(m));
+  replace_text(camera / "sensor.yaml", "[320, 240]", "[160, 120]");
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  REQUIRE(sequence->info().warnings.size() == 1);
+  CHECK(sequence->info().warnings[0].find("rectified to a field of view of") != std::string::npos);
+  CHECK(sequence->info().stereo.width == kWidth);
+  const FrameImages images = sequence->read(0);
+  CHECK(images.right.width == kWidth);
+  CHECK(images.right.height == kHeight);
+  check_points(*sequence, 0.25);  // half a pixel of the right image is one of the pair
+}
+
+TEST_CASE("EuRoC's list of images of the cases, without a # before the columns' names") {
+  const auto cases = shared_cases("euroc");
+  if (!cases) return;
+  const TempFolder folder;
+  write_euroc(folder.path());
+  const fs::path list = *cases / "data_without_hash.csv";
+  int listed = 0;
+  for (int side = 0; side < 2; ++side) {
+    const fs::path camera = folder.path() / "mav0" / ("cam" + std::to_string(side));
+    std::istringstream lines(read_text(list));
+    std::string line;
+    std::getline(lines, line);
+    CHECK(line == "timestamp,filename");
+    for (listed = 0; std::getline(lines, line); ++listed) {
+      fs::copy_file(camera / "data" / (std::to_string(stamp(0)) + ".png"),
+                    camera / "data" / line.substr(line.find(',') + 1));
+    }
+    fs::copy_file(list, camera / "data.csv", fs::copy_options::overwrite_existing);
+  }
+  fs::remove_all(folder.path() / "mav0/state_groundtruth_estimate0");
+  const auto sequence = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  CHECK(sequence->size() == static_cast<std::size_t>(listed));
+  CHECK(sequence->info().times[0] == 1);
+  CHECK(sequence->info().times[1] == Approx(1.1).epsilon(1e-12));
 }
 
 TEST_CASE("EuRoC opens from mav0 and from a folder of sequences") {

@@ -1,6 +1,7 @@
 #include "frontend/input/image_file.h"
 
 #include <png.h>
+#include <zlib.h>
 
 #include <catch2/catch.hpp>
 #include <cstdio>
@@ -8,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "test/frontend/input/dataset_writer.h"
+#include "test/support/allocation_watch.h"
 
 namespace hybrid_slam {
 namespace {
@@ -278,6 +280,45 @@ TEST_CASE("a JPEG that lacks some of its compressed data is refused") {
   write_text(folder.path() / "a.jpg", bytes);
   const std::string line = complaint([&] { read_gray_image(folder.path() / "a.jpg", kSize); });
   CHECK(line.find("a.jpg: damaged JPEG (") != std::string::npos);
+}
+
+// The header alone made room for a gigabyte.
+TEST_CASE(
+    "a file of few bytes that tells of many pixels is refused before there is room for them") {
+  const TempFolder folder;
+  const auto path = folder.path() / "a";
+  const auto refusal = [&](const std::string& file) {
+    write_text(path, file);
+    return complaint([&] { read_gray_image(path); });
+  };
+  const auto number = [](std::uint32_t value, bool big_endian) {
+    std::string bytes;
+    for (int i = 0; i < 4; ++i) {
+      bytes += static_cast<char>(value >> (big_endian ? 24 - 8 * i : 8 * i));
+    }
+    return bytes;
+  };
+  const auto chunk = [&](const std::string& content) {  // of a PNG
+    const auto* const bytes = reinterpret_cast<const Bytef*>(content.data());
+    return number(static_cast<std::uint32_t>(content.size()) - 4, true) + content +
+           number(static_cast<std::uint32_t>(crc32(0, bytes, static_cast<uInt>(content.size()))),
+                  true);
+  };
+  const std::string begin = "\x89PNG\r\n\x1a\n";
+  const auto png = [&](std::uint32_t side, const std::string& kind) {
+    return begin + chunk("IHDR" + number(side, true) + number(side, true) + kind) + chunk("IDAT");
+  };
+  using namespace std::string_literals;
+  const AllocationWatch watch;
+  CHECK(refusal(png(30000, "\x08\0\0\0\0"s)).find("more pixels than its bytes can hold") !=
+        std::string::npos);
+  CHECK(refusal(png(850, "\x10\x06\0\0\0"s)).ends_with("truncated PNG"));  // 8 bytes each
+  CHECK(refusal("P5 30000 30000 255\n").ends_with("truncated PGM or PPM"));
+  const std::string bmp = "BM" + number(54, false) + number(0, false) + number(54, false) +
+                          number(40, false) + number(30000, false) + number(30000, false) +
+                          "\x01\0\x18\0"s + std::string(24, '\0');
+  CHECK(refusal(bmp).ends_with("truncated BMP"));
+  CHECK(watch.largest() < (1 << 20));
 }
 
 TEST_CASE("what is no image, missing or of another size is refused") {

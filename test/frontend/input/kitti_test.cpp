@@ -63,6 +63,36 @@ TEST_CASE("a KITTI dataset opens from its root, its sequences and the sequence")
   }
 }
 
+TEST_CASE("KITTI's files with byte order marks and Windows line ends, and in UTF-16") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  const fs::path sequence = folder.path() / "sequences/07";
+  const fs::path files[] = {sequence / "calib.txt", sequence / "times.txt",
+                            folder.path() / "poses/07.txt"};
+  for (const fs::path& file : files) {
+    std::string marked = "\xEF\xBB\xBF";
+    for (const char c : read_text(file)) marked += c == '\n' ? "\r\n" : std::string(1, c);
+    write_text(file, marked);
+  }
+  const auto opened = open_sequence(folder.path().string(), SequenceLayout::kAuto, "");
+  const SequenceInfo& info = opened->info();
+  CHECK(info.warnings.empty());
+  CHECK(info.stereo.params == std::array<double, 5>{700, 700, 30, 20, 0.5});
+  CHECK(info.times[3] == 1.5);
+  CHECK(info.truth[4].world_from_cam.translation() == Eigen::Vector3d(4, 2, 3));
+  for (const fs::path& file : files) {
+    const std::string good = read_text(file);
+    std::string wide = "\xFF\xFE";
+    for (const char c : good.substr(3)) (wide += c) += '\0';
+    write_text(file, wide);
+    const std::string line = open_complaint(folder.path());
+    INFO(line);
+    CHECK(line.starts_with(file.string()));
+    CHECK(line.find("UTF-16") != std::string::npos);
+    write_text(file, good);
+  }
+}
+
 TEST_CASE("a KITTI sequence without truth, and one with less truth than frames") {
   const TempFolder folder;
   write_kitti(folder.path(), false);

@@ -35,6 +35,20 @@ TEST_CASE("what is no finite number is refused with its line") {
   CHECK(complaint([&] { read_number_rows(path, ','); }).find(":1: ") != std::string::npos);
 }
 
+// Found by fuzzing: as nanoseconds such times did not fit into 64 bits.
+TEST_CASE("times of centuries are refused") {
+  const TempFolder folder;
+  const auto path = folder.path() / "times.txt";
+  std::vector<std::string> warnings;
+  for (const char* const text : {"#timestamp [ns]\n1403636579763555584\n14003636579813555456\n",
+                                 "1\n1e10\n", "-1e10\n1\n", "0\n1e300\n"}) {
+    write_text(path, text);
+    CHECK(complaint([&] { read_times(path, warnings); }).ends_with("times of more than 292 years"));
+  }
+  write_text(path, "9000000000000000000\n9100000000000000000\n");
+  CHECK(read_times(path, warnings)[1] == 9.1e9);
+}
+
 TEST_CASE("times ascend strictly, one per line") {
   const TempFolder folder;
   const auto path = folder.path() / "times.txt";

@@ -8,9 +8,11 @@
 
 #include "backend/map/frame_observations.h"
 #include "cameras/geometry/se3.h"
+#include "cameras/geometry/uncertain_motion.h"
 #include "test/frontend/matching/blob_texture.h"
 #include "test/frontend/pose/pose_scene.h"
 #include "test/support/motion_blur.h"
+#include "test/support/random.h"
 #include "test/support/stereo_frame.h"
 
 namespace hybrid_slam {
@@ -24,7 +26,7 @@ StereoFeatures without_right(StereoFeatures features) {
 
 double normalized_error(const StereoMotion& motion, const Rigid3d& truth) {
   const Vector6d off = se3_log(truth * inverse(motion.current_from_previous));
-  return off.dot(motion.covariance.ldlt().solve(off)) / 6;
+  return squared_mahalanobis(off, motion.covariance) / 6;
 }
 
 SyntheticScene scene_of(SceneTrajectory trajectory, std::uint64_t seed) {
@@ -68,8 +70,6 @@ struct Wall {
   }
 };
 
-}  // namespace
-
 TEST_CASE("Matches of the left image alone tell the motion, and how certain it is") {
   for (const SceneTrajectory trajectory : {SceneTrajectory::kCorridor, SceneTrajectory::kHover}) {
     double sum = 0;
@@ -106,6 +106,58 @@ TEST_CASE("Left matches between two places are not believed") {
   }
 }
 
+// Fourteen keypoints that are found again where a wrong motion leads, among thirty that are not.
+struct Ribs {
+  Calibrated<RectifiedStereo> camera{{300, 300, 160, 120, 0.1}, 320, 240};
+  StereoFeatures before, after;
+
+  // `spread` [px]: the side of the square that they lie in.
+  explicit Ribs(double spread) {
+    Random random(3);
+    const Rigid3d wrong(Eigen::Quaterniond::Identity(), {0.4, 0, 0});
+    for (int i = 0; i < 44; ++i) {
+      const bool rib = i < 14;
+      const double u = rib ? 60 + random.uniform(0, spread) : random.uniform(0, 320);
+      const double v = rib ? 20 + random.uniform(0, spread) : random.uniform(0, 240);
+      const double depth = random.uniform(2, 5);
+      const Eigen::Vector3d point((u - 160) / 300 * depth, (v - 120) / 300 * depth, depth);
+      const Eigen::Vector3d moved = wrong * point;
+      add(before, u, v, u - 300 * 0.1 / depth, i);
+      if (rib) {
+        add(after, 300 * moved.x() / moved.z() + 160 + 0.2 * random.gaussian(),
+            300 * moved.y() / moved.z() + 120 + 0.2 * random.gaussian(), kNoRightMatch, i);
+      } else {
+        add(after, random.uniform(0, 320), random.uniform(0, 240), kNoRightMatch, i);
+      }
+    }
+  }
+
+  static void add(StereoFeatures& features, double u, double v, double u_right, int i) {
+    features.left.keypoints.push_back(
+        {.x = static_cast<float>(u), .y = static_cast<float>(v), .scale = 4, .sigma = 0.5F});
+    Descriptor descriptor{};
+    descriptor[static_cast<std::size_t>(i)] = 255;
+    features.left.descriptors.push_back(descriptor);
+    features.u_right.push_back(static_cast<float>(u_right));
+    features.right_of_left.push_back(-1);
+  }
+};
+
+TEST_CASE("Many matches at one place are little evidence") {
+  const auto motion_of = [](const Ribs& ribs) {
+    return motion_by_left_matches(ribs.camera, ribs.before, ribs.after);
+  };
+  const auto all_over = motion_of(Ribs(180));
+  REQUIRE(all_over);
+  CHECK(all_over->support.inliers >= 14);
+  CHECK(is_no_accident(all_over->support));
+  const auto at_one_place = motion_of(Ribs(40));
+  REQUIRE(at_one_place);
+  CHECK(at_one_place->support.inliers >= 14);
+  CHECK(at_one_place->support.evidence <= 4);
+  CHECK_FALSE(is_no_accident(at_one_place->support));
+}
+
 TEST_CASE("Patches tell the motion into a blurred image, and nothing of a black one") {
   Wall wall;
   const ImagePyramid before(wall.image(0));
@@ -125,4 +177,5 @@ TEST_CASE("Patches tell the motion into a blurred image, and nothing of a black 
   CHECK_FALSE(motion_by_patches(wall.camera, wall.features, before, ImagePyramid(black)));
 }
 
+}  // namespace
 }  // namespace hybrid_slam

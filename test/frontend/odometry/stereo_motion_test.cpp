@@ -196,7 +196,7 @@ std::vector<double> normalized_errors(SceneOptions options, int runs) {
     const auto found = scene.solve({.ransac_iterations = 50});
     REQUIRE(found);
     const Vector6d off = se3_log(found->current_from_previous * inverse(scene.truth));
-    errors.push_back(off.dot(found->covariance.ldlt().solve(off)));
+    errors.push_back(squared_mahalanobis(off, found->covariance));
   }
   return errors;
 }

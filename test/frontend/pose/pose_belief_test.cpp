@@ -13,7 +13,7 @@ namespace hybrid_slam {
 namespace {
 
 PoseSupport support(int candidates, int inliers, double chance) {
-  return {.candidates = candidates, .inliers = inliers, .chance = chance};
+  return {.candidates = candidates, .inliers = inliers, .evidence = inliers, .chance = chance};
 }
 
 TEST_CASE("The number of false alarms is that of its definition") {

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "cameras/geometry/se3.h"
+#include "frontend/pose/direction_residual.h"
 #include "test/support/random.h"
 #include "test/support/synthetic_scene.h"
 

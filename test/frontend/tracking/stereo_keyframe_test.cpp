@@ -52,6 +52,13 @@ TEST_CASE("Close keypoints are counted with and without landmarks, depths give t
   CHECK(coverage->close_tracked == 1);    // 2.5 m
   CHECK(coverage->close_untracked == 3);  // 2 m, 3.9 m, 1 m
   CHECK(coverage->median_depth == Approx(3.9).epsilon(1e-4));
+  LeftOutKeypoints left_out(9);
+  left_out[0] = left_out[1] = left_out[7] = true;  // 2 m, 2.5 m, 8 m
+  const auto without = stereo_coverage(camera(), frame, 4, left_out);
+  REQUIRE(without);
+  CHECK(without->close_tracked == 0);
+  CHECK(without->close_untracked == 2);
+  CHECK(without->median_depth == Approx(4.1).epsilon(1e-4));
   CHECK_FALSE(stereo_coverage(camera(), frame_with({0, 0}), 4));
   CHECK_FALSE(stereo_coverage(camera(), frame_with({}), 4));
 }
