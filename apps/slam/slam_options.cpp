@@ -269,8 +269,8 @@ void fields_of(S section, CullingOptions& options) {
   section.field("min_found_ratio", options.min_found_ratio)
       .field("min_observations", options.min_observations)
       .field("probation", options.probation)
-      .field("redundant_share", options.redundant_share)
-      .field("redundant_observers", options.redundant_observers)
+      .field("redundant_share", options.redundancy.share)
+      .field("redundant_observers", options.redundancy.observers)
       .field("close_baselines", options.close_baselines)
       .field("full_keyframes", options.full_keyframes)
       .refuse_unknown();
@@ -352,6 +352,7 @@ void SlamOptions::distribute() {
        {static_cast<TrackerOptions*>(&tracking), static_cast<TrackerOptions*>(&fisheye.tracking)}) {
     tracker->max_features = features;
     tracker->relocalization.ransac.seed = seed;
+    tracker->redundancy = culling.redundancy;
   }
   tracking.odometer.seed = seed;
   loops.finder.verifier.pose.seed = seed;

@@ -9,7 +9,6 @@ namespace hybrid_slam {
 namespace {
 
 constexpr int kNeighbours = 15;  // landmarks in common, as fusion and the search for loops count
-constexpr double kSameScale = 1.26;  // a third of an octave: SIFT's step between scales
 
 int weighted_observations(const MapSnapshot& map, const Landmark& landmark) {
   int count = 0;
@@ -20,35 +19,13 @@ int weighted_observations(const MapSnapshot& map, const Landmark& landmark) {
   return count;
 }
 
-// The size of the landmark's image in a keyframe, comparable between cameras.
-double normalized_scale(const MapSnapshot& map, const Keyframe& keyframe, std::size_t keypoint) {
-  return keyframe.observations->features.keypoints[keypoint].scale /
-         focal_length(map.camera(keyframe));
-}
-
-// Do enough other keyframes, all but `erased`, see the landmark at the same or a finer scale?
-bool seen_elsewhere(const MapSnapshot& map, const Landmark& landmark, KeyframeId keyframe,
-                    double scale, const std::vector<KeyframeId>& erased, int enough) {
-  int observers = 0;
-  for (const Observation& observation : landmark.observations) {
-    if (observation.keyframe == keyframe ||
-        std::find(erased.begin(), erased.end(), observation.keyframe) != erased.end()) {
-      continue;
-    }
-    if (normalized_scale(map, map.at(observation.keyframe), observation.keypoint) <=
-            kSameScale * scale &&
-        ++observers >= enough) {
-      return true;
-    }
-  }
-  return false;
-}
-
 bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
                   const std::vector<KeyframeId>& erased, const CullingOptions& options) {
   const double stereo_baseline = baseline(map.camera(keyframe));
   const double max_depth = stereo_baseline > 0 ? options.close_baselines * stereo_baseline
                                                : std::numeric_limits<double>::infinity();
+  std::vector<KeyframeId> left_out = erased;
+  left_out.push_back(keyframe.id);
   int counted = 0;
   int redundant = 0;
   for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
@@ -59,12 +36,12 @@ bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
       continue;
     }
     ++counted;
-    const double scale = normalized_scale(map, keyframe, i);
-    redundant +=
-        seen_elsewhere(map, *landmark, keyframe.id, scale, erased, options.redundant_observers) ? 1
-                                                                                                : 0;
+    const Keypoint& keypoint = keyframe.observations->features.keypoints[i];
+    const double scale = normalized_scale(map.camera(keyframe), keypoint);
+    const int observers = options.redundancy.observers;
+    redundant += is_well_seen(map, *landmark, scale, observers, left_out) ? 1 : 0;
   }
-  return counted > 0 && redundant > options.redundant_share * counted;
+  return counted > 0 && redundant > options.redundancy.share * counted;
 }
 
 // Of its camera: tracking refers to it, and the odometry of the next one will begin there.
@@ -80,11 +57,9 @@ std::string CullingOptions::validate() const {
   if (!(min_found_ratio >= 0 && min_found_ratio <= 1)) {
     return "culling: min_found_ratio must lie in [0, 1]";
   }
-  if (!(redundant_share > 0 && redundant_share <= 1)) {
-    return "culling: redundant_share must lie in (0, 1]";
-  }
-  if (min_observations < 1 || probation < 1 || redundant_observers < 1) {
-    return "culling: min_observations, probation and redundant_observers must be positive";
+  if (const std::string error = redundancy.validate(); !error.empty()) return "culling: " + error;
+  if (min_observations < 1 || probation < 1) {
+    return "culling: min_observations and probation must be positive";
   }
   if (!(close_baselines > 0)) return "culling: close_baselines must be positive";
   if (full_keyframes < 0) return "culling: full_keyframes must not be negative";

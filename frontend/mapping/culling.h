@@ -5,16 +5,16 @@
 
 #include "backend/map/map_edit.h"
 #include "backend/map/map_snapshot.h"
+#include "frontend/mapping/redundancy.h"
 
 namespace hybrid_slam {
 
 struct CullingOptions {
   double min_found_ratio = 0.25;  // found / visible of a recent landmark
-  int min_observations = 3;      // of a landmark after `probation` keyframes; a stereo one counts 2
-  int probation = 2;             // keyframes
-  double redundant_share = 0.9;  // of a keyframe's landmarks seen elsewhere
-  int redundant_observers = 3;   // by so many others, at the same or a finer scale
-  double close_baselines = 40;   // stereo: only nearer landmarks count
+  int min_observations = 3;  // of a landmark after `probation` keyframes; a stereo one counts 2
+  int probation = 2;         // keyframes
+  RedundancyOptions redundancy;
+  double close_baselines = 40;  // stereo: only nearer landmarks count
   // So many of the newest keyframes, and those that share 15 landmarks with one of them, are in use
   // and keep features with neither a landmark nor a right match. 0: all keep them.
   int full_keyframes = 10;
@@ -60,9 +60,8 @@ class KeyframeUse {
   std::vector<KeyframeId> in_use_;  // ascending
 };
 
-// Keyframes around `keyframe` that add little: nearly all their (close) landmarks are seen by
-// enough others at the same or a finer scale. Never the origin, nor those to keep, nor `keyframe`
-// itself.
+// Keyframes around `keyframe` whose (close) landmarks make them redundant. Never the origin, nor
+// those to keep, nor `keyframe` itself.
 MapEdit cull_keyframes(const MapSnapshot& map, KeyframeId keyframe, const CullingOptions& options);
 
 }  // namespace hybrid_slam

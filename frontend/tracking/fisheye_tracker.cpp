@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include <utility>
@@ -131,6 +132,9 @@ bool FisheyeTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   evidence.seconds_since_keyframe = frame.time - last_.keyframe_time();
   evidence.keyframes = map.keyframe_count();
   evidence.motion = result.cam_from_reference.translation().norm() / median_distance(map, frame);
+  const double anywhere = std::numeric_limits<double>::infinity();
+  evidence.is_redundant =
+      matcher_.share_well_seen(map, frame, anywhere) > options_.redundancy.share;
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);
 }
 

@@ -27,16 +27,20 @@ bool needs_keyframe(const KeyframeEvidence& evidence, int max_features,
   }
   const double min_ratio =
       evidence.keyframes < 2 ? options.min_tracked_ratio_young : options.min_tracked_ratio;
-  const bool weak = evidence.inliers < min_ratio * evidence.reference_landmarks;
+  // What has left the view is missed only where the rest is seen from here for the first times.
+  const double expected =
+      evidence.reference_landmarks * (evidence.is_redundant ? evidence.overlap : 1);
+  const bool weak = evidence.inliers < min_ratio * expected;
   const bool needs_close = evidence.close_tracked < options.min_close_tracked * max_features &&
                            evidence.close_untracked > options.min_close_untracked;
-  const bool has_moved_on =
-      evidence.overlap < options.min_overlap || evidence.new_ground > options.max_new_ground;
+  const bool is_new = evidence.new_ground > options.max_new_ground;
+  const bool has_moved_on = evidence.overlap < options.min_overlap;
   const bool is_late = (options.max_frames_between > 0 &&
                         evidence.frames_since_keyframe >= options.max_frames_between) ||
                        (options.max_seconds_between > 0 &&
                         evidence.seconds_since_keyframe >= options.max_seconds_between);
-  return has_moved_on || weak || needs_close || (is_late && evidence.motion > options.min_motion);
+  const bool another_view = has_moved_on || (is_late && evidence.motion > options.min_motion);
+  return is_new || weak || needs_close || (another_view && !evidence.is_redundant);
 }
 
 }  // namespace hybrid_slam

@@ -75,6 +75,23 @@ MapMatcher::Search MapMatcher::search_of(const MapSnapshot& map, const Frame& fr
               accidental_match_rate(map, view_of(frame), predictions, options_.matcher)};
 }
 
+double MapMatcher::share_well_seen(const MapSnapshot& map, const Frame& frame,
+                                   double max_distance) const {
+  int counted = 0;
+  int well_seen = 0;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
+    if (landmark == nullptr ||
+        (frame.cam_from_world * landmark->point_in_world).norm() > max_distance) {
+      continue;
+    }
+    ++counted;
+    const double scale = normalized_scale(camera_, frame.features.left.keypoints[i]);
+    well_seen += is_well_seen(map, *landmark, scale, options_.redundancy.observers) ? 1 : 0;
+  }
+  return counted == 0 ? 0 : static_cast<double>(well_seen) / counted;
+}
+
 void MapMatcher::keep_agreeing(const MapSnapshot& map, Frame& frame) const {
   PoseRefinementOptions test_alone = options_.pose;
   test_alone.rounds = 1;

@@ -9,6 +9,7 @@
 
 #include "backend/map/map_edit.h"
 #include "backend/map/map_snapshot.h"
+#include "frontend/mapping/redundancy.h"
 #include "frontend/matching/projection_matcher.h"
 #include "frontend/place_recognition/keyframe_database.h"
 #include "frontend/pose/pose_belief.h"
@@ -30,6 +31,7 @@ struct TrackerOptions {
   PoseRefinementOptions pose;
   LocalMapOptions local_map;
   KeyframePolicyOptions keyframes;
+  RedundancyOptions redundancy;  // as culling has it
   RelocalizationOptions relocalization;
   TrackRefinementOptions refinement;
 
@@ -99,6 +101,9 @@ class MapMatcher {
   // The same in `keyframes` alone.
   bool relocalize_in(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
                      Frame& frame) const;
+
+  // Share of the frame's landmarks, those nearer than this, that keyframes enough see as well.
+  double share_well_seen(const MapSnapshot& map, const Frame& frame, double max_distance) const;
 
   // The frame becomes a keyframe: its image can serve as a reference.
   void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }

@@ -92,6 +92,8 @@ bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   evidence.seconds_since_keyframe = frame.time - last_.keyframe_time();
   evidence.keyframes = map.keyframe_count();
   evidence.motion = result.cam_from_reference.translation().norm() / coverage->median_depth;
+  evidence.is_redundant =
+      matcher_.share_well_seen(map, frame, close_depth()) > options_.redundancy.share;
   evidence.by_odometry = result.source == PoseSource::kOdometer;
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);
 }

@@ -40,7 +40,7 @@ TEST_CASE("map.hslam holds the map of the run, its options and the program") {
   CHECK(options.seed == 7);
   CHECK(options.stereo.ratio == 0.87);
   CHECK_FALSE(options.sift.upsample);
-  CHECK(options.culling.redundant_share == SlamOptions().culling.redundant_share);
+  CHECK(options.culling.redundancy.share == SlamOptions().culling.redundancy.share);
 }
 
 TEST_CASE("checkpoints change nothing of the result") {

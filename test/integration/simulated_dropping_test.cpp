@@ -102,7 +102,7 @@ double growth(const SimulatedSource& source, int full_keyframes, RunResult& resu
   result = {};  // of a run before: held until now
   SlamOptions options = with_full_keyframes(simulated_options(), full_keyframes);
   options.tracking.keyframes.max_frames_between = 1;
-  options.culling.redundant_observers = 1000;
+  options.culling.redundancy.observers = 1000;
   options.backend.local_method = LocalMethod::kBundle;
   options.backend.local.max_neighbours = 3;
   options.backend.local.max_fixed = 5;

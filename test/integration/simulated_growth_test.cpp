@@ -46,7 +46,7 @@ TEST_CASE("Tracking and the search for loops cost the same at 200 and at 2000 ke
   slam.features = 400;
   slam.distribute();
   slam.tracking.keyframes.max_frames_between = 1;  // every frame becomes one, and stays
-  slam.culling.redundant_observers = 1000;
+  slam.culling.redundancy.observers = 1000;
   std::stop_source cancel;
   ReplayHooks hooks;
   hooks.cancelled = cancel.get_token();

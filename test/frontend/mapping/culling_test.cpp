@@ -198,7 +198,7 @@ TEST_CASE("CullingOptions out of range are refused") {
     }
   };
   refused([](auto& options, double value) { options.min_found_ratio = value; });
-  refused([](auto& options, double value) { options.redundant_share = value; });
+  refused([](auto& options, double value) { options.redundancy.share = value; });
   refused([](auto& options, double value) { options.close_baselines = value; });
 }
 

@@ -99,6 +99,7 @@ TEST_CASE("A fisheye keyframe is what was seen, without new points") {
   FisheyeTrackerOptions options;
   options.keyframes.max_frames_between = 1;
   options.keyframes.min_motion = 0;
+  options.redundancy.observers = 1000;  // what others see is no reason not to
   FisheyeTracker tracker = world.tracker(options);
   const TrackedFrame tracked = tracker.track(world.frame(9), world.map(), KeyframeId());
   REQUIRE(tracked.keyframe);

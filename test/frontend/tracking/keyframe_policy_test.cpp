@@ -40,6 +40,27 @@ TEST_CASE("When a frame becomes a keyframe") {
        false},
       {"overlap just above 0.85", [](KeyframeEvidence& e) { e.overlap = 0.851; }, false},
       {"overlap just below 0.85", [](KeyframeEvidence& e) { e.overlap = 0.849; }, true},
+      {"left behind, but well seen",
+       [](KeyframeEvidence& e) {
+         e.overlap = 0.6;
+         e.inliers = 196;
+         e.seconds_since_keyframe = 60;
+         e.is_redundant = true;
+       },
+       false},
+      {"well seen, but not found again",
+       [](KeyframeEvidence& e) {
+         e.overlap = 0.6;
+         e.inliers = 194;
+         e.is_redundant = true;
+       },
+       true},
+      {"well seen, beside new ground",
+       [](KeyframeEvidence& e) {
+         e.new_ground = 0.151;
+         e.is_redundant = true;
+       },
+       true},
       {"new ground just below 0.15", [](KeyframeEvidence& e) { e.new_ground = 0.149; }, false},
       {"new ground just above 0.15", [](KeyframeEvidence& e) { e.new_ground = 0.151; }, true},
       {"hardly tracked at all", [](KeyframeEvidence& e) { e.inliers = 15; }, false},

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backend/map/map_snapshot.h"
+
+namespace hybrid_slam {
+
+// When a view adds nothing: nearly all landmarks in it are seen by enough keyframes already, at the
+// same or a finer scale (ORB-SLAM's rule). Such a keyframe is taken out of the map again, and such
+// a frame becomes none, or a vehicle that hovers would make and lose keyframes for ever.
+struct RedundancyOptions {
+  double share = 0.9;  // of the landmarks in view
+  int observers = 3;   // keyframes
+
+  std::string validate() const;
+};
+
+// The size of a keypoint's image, comparable between cameras: its scale over the focal length.
+double normalized_scale(const Camera& camera, const Keypoint& keypoint);
+
+// Whether enough keyframes, all but those `left_out`, see the landmark at this normalized scale or
+// a finer one.
+bool is_well_seen(const MapSnapshot& map, const Landmark& landmark, double scale, int observers,
+                  const std::vector<KeyframeId>& left_out = {});
+
+}  // namespace hybrid_slam
