@@ -15,8 +15,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kScale = 0.01;       // error of the scale beyond which a rig is to be calibrated
-constexpr double kRows = 0.75;        // [px] of the 1 px that stereo matches have
 constexpr double kSystematic = 0.25;  // [px] half of what a keypoint's own place is good for
 
 void judge_rows(const RigFindings& rig, std::vector<std::string>& reasons) {
@@ -28,7 +26,7 @@ void judge_rows(const RigFindings& rig, std::vector<std::string>& reasons) {
         100 * rig.alignment->focal_ratio));
   }
   const double rows = rig.rows.systematic_rms();
-  if (rows > kRows) {
+  if (rows > PairAlignment::kHarmlessRows) {
     reasons.push_back(fmt::format("rows are {:.2f} px off by place in the image", rows));
   }
 }
@@ -37,7 +35,7 @@ void judge_rows(const RigFindings& rig, std::vector<std::string>& reasons) {
 void judge_disparities(const RigFindings& rig, std::vector<std::string>& reasons) {
   if (!(rig.median_disparity > 0)) return;
   const double scale = std::abs(rig.disparity_offset) / rig.median_disparity;
-  if (scale <= kScale) return;
+  if (scale <= kDoubtfulScale) return;
   reasons.push_back(fmt::format("disparities are {:.2f} px off, {:.1f} % of the scale (taken out)",
                                 rig.disparity_offset, 100 * scale));
 }

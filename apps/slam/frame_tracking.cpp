@@ -143,7 +143,7 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
 void FrameTracking::learn_calibration(const CameraFrame& frame) {
   if (frame.camera != CameraKind::kStereo) return;
   add_rows(frame.frame.features, rig_.rows);
-  rig_.median_disparity = median_disparity(frame.frame.features);
+  rig_.median_disparity = median_disparity(frame.frame.features.left, frame.frame.features.u_right);
   if (frame.evidence.alignment) rig_.alignment = *frame.evidence.alignment;
 }
 

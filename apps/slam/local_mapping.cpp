@@ -2,30 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
+#include "frontend/calibration/rig_calibrator.h"
 #include "frontend/mapping/fusion.h"
 #include "frontend/mapping/triangulation.h"
 
 namespace hybrid_slam {
 
 namespace {
-
-constexpr double kDoubtfulScale = 0.01;  // beyond which a rig should be calibrated again
-
-// Infinite without right matches: then nothing is shown.
-double median_disparity(const FrameObservations& seen) {
-  std::vector<double> disparities;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen.has_right(i)) disparities.push_back(seen.features.keypoints[i].x - seen.u_right[i]);
-  }
-  if (disparities.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);
-  std::nth_element(disparities.begin(), middle, disparities.end());
-  return *middle;
-}
 
 // The keyframe as it lies in `map`, which may have moved since it was tracked: by a loop that was
 // closed, far.
@@ -104,8 +90,10 @@ void LocalMapping::take_offset_out(const MappingJob& job) {
   if (job.camera != CameraKind::kStereo) return;
   const double by = job.disparity_offset - disparity_offset_;
   const double most = std::max(std::abs(job.disparity_offset), std::abs(disparity_offset_));
-  if (by == 0 || most < kDoubtfulScale * median_disparity(*job.keyframe.observations)) return;
-  backend_.shift_disparities(job.keyframe.observations->camera, by);
+  const FrameObservations& seen = *job.keyframe.observations;
+  const double disparity = median_disparity(seen.features, seen.u_right);
+  if (by == 0 || !(disparity > 0) || most < kDoubtfulScale * disparity) return;
+  backend_.shift_disparities(seen.camera, by);
   if (wants_full_bundle(backend_.view(), options_.backend.full)) backend_.optimize_full();
   disparity_offset_ = job.disparity_offset;
 }

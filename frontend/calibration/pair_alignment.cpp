@@ -68,9 +68,7 @@ RowFit fit_rows(const Calibrated<RectifiedStereo>& camera, const std::vector<Pai
 }  // namespace
 
 bool PairAlignment::is_shown() const {
-  // Of the 1 px of room that stereo matches have. Few matches claimed 0.58 px of a sound pair.
-  constexpr double kHarmless = 0.75;
-  return matches > 0 && row_rms > std::max(row_sigma, kHarmless) &&
+  return matches > 0 && row_rms > std::max(row_sigma, kHarmlessRows) &&
          matches * row_rms * row_rms > kAccidentalChi2 * row_sigma * row_sigma;
 }
 

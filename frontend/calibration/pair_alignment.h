@@ -19,6 +19,10 @@ namespace hybrid_slam {
 // and s; y shifts all columns alike, which rows do not show but for the small v u: that is left to
 // DisparityCalibrator.
 struct PairAlignment {
+  // [px] by which rows may be off: it costs no matches, which have 1 px of room. Few matches
+  // claimed 0.58 px of a sound pair.
+  static constexpr double kHarmlessRows = 0.75;
+
   double pitch = 0;        // x [rad]
   double roll = 0;         // z [rad]
   double focal_ratio = 0;  // s: the right focal length over the left one, less 1
@@ -27,8 +31,7 @@ struct PairAlignment {
   double row_sigma = 0;    // what is left over: standard deviation of one match [px]
 
   // Whether it is no accident (once in a million pairs that are aligned), and worth a correction:
-  // more than the noise of a single match and than 0.75 px. Less costs no matches, which have that
-  // much room.
+  // more than the noise of a single match and than what is harmless.
   bool is_shown() const;
 };
 

@@ -44,12 +44,10 @@ void add_rows(const StereoFeatures& features, RowField& rows) {
   }
 }
 
-double median_disparity(const StereoFeatures& features) {
+double median_disparity(const FeatureSet& left, const std::vector<float>& u_right) {
   std::vector<double> disparities;
-  for (std::size_t i = 0; i < features.u_right.size(); ++i) {
-    const float u_right = features.u_right[i];
-    if (std::isnan(u_right)) continue;
-    disparities.push_back(double{features.left.keypoints[i].x} - u_right);
+  for (std::size_t i = 0; i < u_right.size(); ++i) {
+    if (!std::isnan(u_right[i])) disparities.push_back(double{left.keypoints[i].x} - u_right[i]);
   }
   if (disparities.empty()) return 0;
   const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);

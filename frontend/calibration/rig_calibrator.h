@@ -52,7 +52,10 @@ std::shared_ptr<const NoiseFloor> floor_of(const ResidualMap& residuals);
 // The rows of the matches.
 void add_rows(const StereoFeatures& features, RowField& rows);
 
-// Of the matches [px]; 0 without any.
-double median_disparity(const StereoFeatures& features);
+// Error of the scale beyond which a rig is to be calibrated again.
+inline constexpr double kDoubtfulScale = 0.01;
+
+// Of the left keypoints with a right match [px]; 0 without any.
+double median_disparity(const FeatureSet& left, const std::vector<float>& u_right);
 
 }  // namespace hybrid_slam
