@@ -8,8 +8,8 @@
 namespace hybrid_slam {
 
 // When a view adds nothing: nearly all landmarks in it are seen by enough keyframes already, at the
-// same or a finer scale (ORB-SLAM's rule). Such a keyframe is taken out of the map again, and such
-// a frame becomes none, or a vehicle that hovers would make and lose keyframes for ever.
+// same or a finer scale (ORB-SLAM's rule). Such a keyframe is taken out of the map again, and a
+// frame that would be such a one does not become it.
 struct RedundancyOptions {
   double share = 0.9;  // of the landmarks in view
   int observers = 3;   // keyframes

@@ -133,8 +133,7 @@ bool FisheyeTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   evidence.keyframes = map.keyframe_count();
   evidence.motion = result.cam_from_reference.translation().norm() / median_distance(map, frame);
   const double anywhere = std::numeric_limits<double>::infinity();
-  evidence.is_redundant =
-      matcher_.share_well_seen(map, frame, anywhere) > options_.redundancy.share;
+  evidence.is_redundant = matcher_.is_redundant(map, frame, anywhere, 0);
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);
 }
 

@@ -75,9 +75,9 @@ MapMatcher::Search MapMatcher::search_of(const MapSnapshot& map, const Frame& fr
               accidental_match_rate(map, view_of(frame), predictions, options_.matcher)};
 }
 
-double MapMatcher::share_well_seen(const MapSnapshot& map, const Frame& frame,
-                                   double max_distance) const {
-  int counted = 0;
+bool MapMatcher::is_redundant(const MapSnapshot& map, const Frame& frame, double max_distance,
+                              int new_points) const {
+  int counted = new_points;
   int well_seen = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
@@ -89,7 +89,7 @@ double MapMatcher::share_well_seen(const MapSnapshot& map, const Frame& frame,
     const double scale = normalized_scale(camera_, frame.features.left.keypoints[i]);
     well_seen += is_well_seen(map, *landmark, scale, options_.redundancy.observers) ? 1 : 0;
   }
-  return counted == 0 ? 0 : static_cast<double>(well_seen) / counted;
+  return well_seen > options_.redundancy.share * counted;
 }
 
 void MapMatcher::keep_agreeing(const MapSnapshot& map, Frame& frame) const {

@@ -102,8 +102,10 @@ class MapMatcher {
   bool relocalize_in(const MapSnapshot& map, std::span<const KeyframeId> keyframes,
                      Frame& frame) const;
 
-  // Share of the frame's landmarks, those nearer than this, that keyframes enough see as well.
-  double share_well_seen(const MapSnapshot& map, const Frame& frame, double max_distance) const;
+  // Whether the frame would be redundant as a keyframe that adds so many points to its landmarks,
+  // of those nearer than this.
+  bool is_redundant(const MapSnapshot& map, const Frame& frame, double max_distance,
+                    int new_points) const;
 
   // The frame becomes a keyframe: its image can serve as a reference.
   void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }

@@ -93,7 +93,7 @@ bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
   evidence.keyframes = map.keyframe_count();
   evidence.motion = result.cam_from_reference.translation().norm() / coverage->median_depth;
   evidence.is_redundant =
-      matcher_.share_well_seen(map, frame, close_depth()) > options_.redundancy.share;
+      matcher_.is_redundant(map, frame, close_depth(), coverage->close_untracked);
   evidence.by_odometry = result.source == PoseSource::kOdometer;
   return needs_keyframe(evidence, options_.max_features, options_.keyframes);
 }

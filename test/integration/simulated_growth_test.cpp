@@ -113,7 +113,6 @@ TEST_CASE("Two thousand frames over mapped ground add few keyframes", "[integrat
   CHECK(result.frames.tracked == 2000);
   CHECK(keyframes < 20);
   CHECK(keyframes <= early + 3);
-  CHECK(made < 20);  // none is made only to be taken out again
   CHECK(max_position_error(result, source) < 0.02);
   CHECK(faults_of(*result.map) == "");
 }
