@@ -27,8 +27,10 @@ void refuse(const char* fault, const char* what) {
   throw std::logic_error("IncrementalSolver: " + std::string(what) + ": " + fault);
 }
 
+// What is left empty holds no memory: keyframes that went for good stay as empty poses.
 void erase_value(std::vector<std::uint32_t>& values, std::uint32_t value) {
   values.erase(std::remove(values.begin(), values.end(), value), values.end());
+  if (values.empty()) values.shrink_to_fit();
 }
 
 }  // namespace
@@ -40,16 +42,48 @@ std::uint32_t IncrementalSolver::add_camera(const Camera& camera) {
 
 std::uint32_t IncrementalSolver::add_pose(const GraphFrame& frame) {
   refuse(frame.cam_from_world.params.allFinite() ? nullptr : "not finite", "pose");
-  const auto index = static_cast<std::uint32_t>(poses_.size());
-  Pose pose;
+  const std::uint32_t index = frame.fixed ? new_pose(true) : free_pose();
+  Pose& pose = poses_[index];
   pose.tangent.place = inverse(frame.cam_from_world).translation();
   pose.folded = frame.cam_from_world;
+  pose.folded_delta.setZero();
   pose.camera = frame.camera;
-  pose.variable = add_variable(false, index, frame.fixed);
-  poses_.push_back(std::move(pose));
-  tree_.resize(variables_.size());
-  if (!frame.fixed) newest_.push_back(poses_[index].variable);
+  if (!frame.fixed) newest_.push_back(pose.variable);
   return index;
+}
+
+std::uint32_t IncrementalSolver::new_pose(bool fixed) {
+  const auto index = static_cast<std::uint32_t>(poses_.size());
+  poses_.emplace_back();
+  poses_.back().variable = add_variable(false, index, fixed);
+  tree_.resize(variables_.size());
+  return index;
+}
+
+// One that was removed, or a new one. Indices tell which poses are new (condense_old()), so that of
+// an old one stays unused.
+std::uint32_t IncrementalSolver::free_pose() {
+  const auto keep = static_cast<std::size_t>(options_.condense_after);
+  std::erase_if(free_poses_, [&](std::uint32_t pose) { return pose + keep < poses_.size(); });
+  if (free_poses_.empty()) return new_pose(false);
+  const std::uint32_t index = free_poses_.back();
+  free_poses_.pop_back();
+  return index;
+}
+
+bool IncrementalSolver::remove_pose(std::uint32_t index) {
+  Pose& pose = item(poses_, index, "pose");
+  Variable& variable = variables_[pose.variable];
+  const bool is_used =
+      variable.fixed || !variable.terms.empty() || !variable.mixed.empty() ||
+      std::find(touched_.begin(), touched_.end(), pose.variable) != touched_.end() ||
+      std::any_of(blocks_.begin(), blocks_.end(), [&](const Block& block) {
+        return block.there && block.carrier == pose.variable;
+      });
+  if (is_used || options_.window > 0 || !tree_.renew(pose.variable)) return false;
+  variable.damping = 0;
+  free_poses_.push_back(index);
+  return true;
 }
 
 std::uint32_t IncrementalSolver::add_variable(bool is_block, std::uint32_t index, bool fixed) {
@@ -154,21 +188,35 @@ std::uint32_t IncrementalSolver::add_edge(const GraphEdge& edge) {
   item(poses_, edge.a, "pose");
   item(poses_, edge.b, "pose");
   refuse(measurement_fault(edge), "edge");
-  const auto index = static_cast<std::uint32_t>(edges_.size());
-  edges_.push_back(edge);
-  edge_there_.push_back(1);
-  edge_factors_.push_back(std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information));
+  const std::uint32_t index = free_edge();
+  edges_[index] = edge;
+  edge_there_[index] = 1;
+  edge_factors_[index] = std::make_unique<RelativePoseFactor>(edge.a_from_b, edge.information);
   EdgeTerm term;
   for (const std::uint32_t pose : {edge.a, edge.b}) {
     const std::uint32_t variable = poses_[pose].variable;
     if (!variables_[variable].fixed) term.poses[term.variable++] = variable;
   }
-  edge_terms_.push_back(term);
-  const std::uint32_t id = add_term(TermKind::kEdge, index);
-  edge_ids_.push_back(id);
+  edge_terms_[index] = term;
+  const std::uint32_t id = edge_ids_[index];
   for (const std::uint32_t pose : {edge.a, edge.b}) link(poses_[pose].variable, id);
   mark_dirty(id);
   return index;
+}
+
+std::uint32_t IncrementalSolver::free_edge() {
+  if (!free_edges_.empty()) {
+    const std::uint32_t index = free_edges_.back();
+    free_edges_.pop_back();
+    return index;
+  }
+  const auto made = static_cast<std::uint32_t>(edges_.size());
+  edges_.emplace_back();
+  edge_there_.push_back(0);
+  edge_factors_.emplace_back();
+  edge_terms_.emplace_back();
+  edge_ids_.push_back(add_term(TermKind::kEdge, made));
+  return made;
 }
 
 void IncrementalSolver::remove_observation(std::uint32_t observation) {
@@ -207,6 +255,7 @@ void IncrementalSolver::remove_edge(std::uint32_t edge) {
     unlink(poses_[pose].variable, edge_ids_[edge]);
   }
   edge_terms_[edge].variable = 0;
+  free_edges_.push_back(edge);
 }
 
 }  // namespace hybrid_slam

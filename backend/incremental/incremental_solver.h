@@ -34,9 +34,10 @@ class IncrementalSolver final : private TermSource {
   explicit IncrementalSolver(const IncrementalOptions& options);
   ~IncrementalSolver() override;
 
-  // All return the index of what they add, counted from 0 per kind; that of a point or observation
-  // which was removed, and of an observation that was marginalised, is used again. They throw
-  // std::logic_error and add nothing if an index is out of range or a number cannot be used.
+  // All return the index of what they add, counted from 0 per kind; that of a pose, point,
+  // observation or edge which was removed, and of an observation that was marginalised, is used
+  // again. They throw std::logic_error and add nothing if an index is out of range or a number
+  // cannot be used.
   std::uint32_t add_camera(const Camera& camera);
   std::uint32_t add_pose(const GraphFrame& frame);
   std::uint32_t add_point(const Eigen::Vector3d& in_world);
@@ -44,6 +45,9 @@ class IncrementalSolver final : private TermSource {
   std::uint32_t add_edge(const GraphEdge& edge);
   void remove_observation(std::uint32_t observation);
   void remove_edge(std::uint32_t edge);
+  // A pose of which no term is left since the last update: its place is another one's from now on.
+  // False if there is one, or if it cannot be: it is fixed, or the newest poses make a window.
+  bool remove_pose(std::uint32_t pose);
   void remove_point(std::uint32_t point);  // with its observations and factors
 
   // Variables and factors of any kind (backend/problem/graph_factor.h), by the same rules; indices
@@ -175,7 +179,10 @@ class IncrementalSolver final : private TermSource {
   std::span<const std::uint32_t> poses_of(std::uint32_t term) const override;
   void assemble(std::uint32_t term, Front& front) const override;
 
+  std::uint32_t free_pose();
+  std::uint32_t new_pose(bool fixed);
   std::uint32_t free_observation();
+  std::uint32_t free_edge();
   std::uint32_t add_term(TermKind kind, std::uint32_t index);
   std::uint32_t add_variable(bool is_block, std::uint32_t index, bool fixed);
   void link(std::uint32_t variable, std::uint32_t term);
@@ -322,7 +329,9 @@ class IncrementalSolver final : private TermSource {
   std::vector<std::uint32_t> free_blocks_;  // indices that may be used again
   std::vector<std::uint32_t> free_factors_;
   std::vector<std::uint32_t> free_observations_;  // indices that may be used again
+  std::vector<std::uint32_t> free_poses_;
   std::vector<std::uint32_t> free_points_;
+  std::vector<std::uint32_t> free_edges_;
   std::uint32_t oldest_ = 0;            // poses before it do not vary
   std::vector<std::uint32_t> dirty_;    // terms
   std::vector<std::uint32_t> touched_;  // variables whose terms changed

@@ -80,6 +80,7 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
   BundleResult result;
   set_outliers_aside(*map, newest, result);
   write_estimate(*map, updated.moved, newest, result);
+  let_keyframes_go(*map);
   known_map_ = std::move(map);
   BundleSummary& summary = result.summary;
   summary.end = updated.pending == 0 ? SolveEnd::kConverged : SolveEnd::kIterationLimit;
@@ -101,9 +102,10 @@ std::shared_ptr<const KeyframeCovariances> MapSmoother::covariances(const MapSna
   }
   IncrementalSolver::PosePaths found = solver_->paths(poses, kMaxCovarianceNumbers);
   std::vector<KeyframeCovariances::Known> known;
-  for (const auto& pose : found.poses) {  // keyframes and poses are numbered in the same order
+  for (const auto& pose : found.poses) {
     known.push_back({keyframe_of_[pose.pose], pose.at, pose.by_variable});
   }
+  std::sort(known.begin(), known.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
   return std::make_shared<const KeyframeCovariances>(map.origin(), std::move(found.paths),
                                                      std::move(known));
 }
@@ -152,10 +154,27 @@ void MapSmoother::take_in_keyframes(const MapSnapshot& map, KeyframeId last) {
     const Keyframe* keyframe = map.find(id);
     pose_of_.push_back(kNone);
     if (keyframe == nullptr) continue;
-    pose_of_.back() = solver_->add_pose(
+    const std::uint32_t pose = solver_->add_pose(
         {keyframe->cam_from_world, keyframe->observations->camera.value, id == map.origin()});
-    keyframe_of_.push_back(id);
+    pose_of_.back() = pose;
+    if (pose == keyframe_of_.size()) keyframe_of_.emplace_back();
+    keyframe_of_[pose] = id;
   }
+}
+
+// Those that were culled leave their poses to others, or a vehicle that hovers would fill memory.
+void MapSmoother::let_keyframes_go(const MapSnapshot& map) {
+  if (known_map_ == nullptr || options_.solver.window > 0) return;
+  for (const KeyframeId id : map.changed_keyframes(*known_map_)) {
+    if (map.find(id) != nullptr || id.value >= pose_of_.size()) continue;
+    if (pose_of_[id.value] != kNone) gone_.push_back(id);
+    odometry_.erase(id);
+  }
+  std::erase_if(gone_, [this](KeyframeId id) {
+    if (!solver_->remove_pose(pose_of_[id.value])) return false;
+    pose_of_[id.value] = kNone;
+    return true;
+  });
 }
 
 void MapSmoother::take_in_loops(const MapSnapshot& map) {

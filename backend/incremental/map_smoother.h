@@ -83,6 +83,7 @@ class MapSmoother {
   };
 
   void take_in_keyframes(const MapSnapshot& map, KeyframeId last);
+  void let_keyframes_go(const MapSnapshot& map);
   void follow_moves(const MapSnapshot& map);
   bool is_off(const Keyframe& keyframe, const Rigid3d& estimate) const;
   void take_in_loops(const MapSnapshot& map);
@@ -103,6 +104,7 @@ class MapSmoother {
   std::size_t camera_count_ = 0;
   std::vector<std::uint32_t> pose_of_;   // by keyframe
   std::vector<KeyframeId> keyframe_of_;  // by pose
+  std::vector<KeyframeId> gone_;         // keyframes whose poses the solver has still
   std::unordered_map<LandmarkId, KnownLandmark> landmarks_;
   std::unordered_map<KeyframeId, KnownOdometry> odometry_;
   std::vector<PoseConstraint> new_loops_;

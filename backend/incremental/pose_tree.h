@@ -73,6 +73,10 @@ class PoseTree {
   }
   Eigen::Index size(std::uint32_t variable) const { return size_[variable]; }
 
+  // A variable that no clique has is as new again: its delta and damping are 0. False, and nothing
+  // is done, if one has it still.
+  bool renew(std::uint32_t variable);
+
   // Moves a pose by as much, whatever the system says. The next solve tells what changes against
   // that.
   void shift(std::uint32_t pose, const Vector6d& by);

@@ -120,6 +120,14 @@ void PoseTree::solve(double threshold, std::vector<std::uint32_t>& changed) {
   for (std::size_t i = first; i < changed.size(); ++i) moved_[changed[i]] = 0;
 }
 
+bool PoseTree::renew(std::uint32_t variable) {
+  if (clique_of_[variable] != kNone) return false;
+  values(delta_, variable).setZero();
+  values(sent_, variable).setZero();
+  damping_[variable] = 0;
+  return true;
+}
+
 void PoseTree::shift(std::uint32_t pose, const Vector6d& by) {
   values(delta_, pose) += by;
   values(sent_, pose) = delta_of(pose);

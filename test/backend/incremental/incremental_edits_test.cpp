@@ -144,6 +144,74 @@ TEST_CASE("incremental edits: a wrong loop that goes again") {
   }
 }
 
+TEST_CASE("incremental edits: an edge takes the place of one that went") {
+  Random random(2);
+  TestPoseGraph grid = grid_pose_graph({4, 4, 3}, {0.05, 0.03}, random);
+  disturb(grid.graph, 0.1, 0.1, 0, 12);
+  for (const bool updated_between : {true, false}) {
+    GraphFeed feed(grid.graph, exact());
+    while (!feed.done()) feed.feed_next();
+    IncrementalSolver& solver = feed.solver();
+    settle(solver, 5);
+    const double before = cost(solver.graph());
+    const std::uint32_t gone = 5;
+    const GraphEdge right = solver.graph().edges[gone];
+    for (int round = 0; round < 3; ++round) {  // elsewhere, and back again
+      GraphEdge wrong = right;
+      wrong.a = 3;
+      wrong.b = 40;
+      solver.remove_edge(gone);
+      if (updated_between) solver.update();
+      CHECK(solver.add_edge(wrong) == gone);
+      settle(solver, 3);
+      CHECK(cost(solver.graph()) > 2 * before);
+      CHECK(excess(solver) < 1e-3);
+      solver.remove_edge(gone);
+      if (updated_between) solver.update();
+      CHECK(solver.add_edge(right) == gone);
+      settle(solver, 10);
+      CHECK(solver.graph().edges.size() == grid.graph.edges.size());
+      CHECK(cost(solver.graph()) == Approx(before).epsilon(1e-6));
+    }
+  }
+}
+
+TEST_CASE("incremental edits: a pose takes the place of one that went") {
+  const FactorGraph graph = arc(12, false);
+  GraphFeed feed(graph, exact());
+  while (!feed.done()) feed.feed_next();
+  IncrementalSolver& solver = feed.solver();
+  settle(solver, 5);
+  const FactorGraph before = solver.graph();
+  const std::size_t count = solver.pose_count();
+  for (std::uint32_t round = 0; round < 8; ++round) {
+    const std::uint32_t like = 3 + round;  // another place each time
+    Rigid3d start = before.frames[like].cam_from_world;
+    start.translation() += Eigen::Vector3d(0.02, -0.01, 0.03);
+    const std::uint32_t pose = solver.add_pose({start, 0, false});
+    CHECK(pose == count);
+    std::vector<std::uint32_t> added;
+    for (GraphObservation observation : before.observations) {
+      if (observation.frame != like) continue;
+      observation.frame = pose;
+      added.push_back(solver.add_observation(observation));
+    }
+    REQUIRE(added.size() > 20);
+    CHECK(!solver.remove_pose(pose));
+    settle(solver, 5);
+    CHECK(excess(solver) < 1e-6);
+    CHECK((solver.pose(pose).params - solver.pose(like).params).norm() < 1e-6);
+    for (const std::uint32_t observation : added) solver.remove_observation(observation);
+    CHECK(!solver.remove_pose(pose));  // not before an update
+    settle(solver, 5);
+    CHECK(solver.remove_pose(pose));
+    CHECK(cost(solver.graph()) == Approx(cost(before)).epsilon(1e-6));
+  }
+  CHECK(solver.pose_count() == count + 1);
+  CHECK(!solver.remove_pose(0));
+  CHECK_THROWS_AS(solver.remove_pose(1000), std::logic_error);
+}
+
 TEST_CASE("incremental edits: two runs are the same, bit by bit") {
   const FactorGraph graph = arc(15, true);
   GraphFeed first(graph, {});
