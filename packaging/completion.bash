@@ -9,7 +9,7 @@ _hybrid_slam() {
     mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current")
   elif [[ $previous == --* ]]; then
     case $previous in
-      --layout) words="auto kitti euroc uwslam" ;;
+      --layout) words="auto kitti euroc uwslam 4seasons" ;;
       --mode) words="every-frame realtime" ;;
       --cameras) words="auto stereo hybrid" ;;
       --device) words="auto cpu cuda" ;;

@@ -17,7 +17,8 @@ void add_dataset_options(CLI::App& app, InputChoice& input) {
   const std::map<std::string, SequenceLayout> layouts{{"auto", SequenceLayout::kAuto},
                                                       {"kitti", SequenceLayout::kKitti},
                                                       {"euroc", SequenceLayout::kEuroc},
-                                                      {"uwslam", SequenceLayout::kUwslam}};
+                                                      {"uwslam", SequenceLayout::kUwslam},
+                                                      {"4seasons", SequenceLayout::kFourSeasons}};
   const std::map<std::string, SequenceCameras> cameras{{"auto", SequenceCameras::kAuto},
                                                        {"stereo", SequenceCameras::kStereo},
                                                        {"hybrid", SequenceCameras::kHybrid}};
@@ -32,7 +33,7 @@ void add_dataset_options(CLI::App& app, InputChoice& input) {
         input.more_bags.assign(paths.begin() + 1, paths.end());
       },
       "folder of the dataset; or bags that follow one another");
-  app.add_option("--layout", input.layout, "auto, kitti, euroc or uwslam")
+  app.add_option("--layout", input.layout, "auto, kitti, euroc, uwslam or 4seasons")
       ->transform(CLI::CheckedTransformer(layouts).description(""))
       ->option_text("NAME");
   app.add_option("--sequence", input.sequence,

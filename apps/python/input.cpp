@@ -8,7 +8,8 @@ namespace {
 const std::map<std::string, SequenceLayout> kLayouts{{"auto", SequenceLayout::kAuto},
                                                      {"kitti", SequenceLayout::kKitti},
                                                      {"euroc", SequenceLayout::kEuroc},
-                                                     {"uwslam", SequenceLayout::kUwslam}};
+                                                     {"uwslam", SequenceLayout::kUwslam},
+                                                     {"4seasons", SequenceLayout::kFourSeasons}};
 const std::map<std::string, SequenceCameras> kCameras{{"auto", SequenceCameras::kAuto},
                                                       {"stereo", SequenceCameras::kStereo},
                                                       {"hybrid", SequenceCameras::kHybrid}};
@@ -74,7 +75,7 @@ void bind_sequence(py::module_& module) {
       .def_property_readonly("name", [](const ImageSequence& s) { return s.info().name; })
       .def_property_readonly(
           "layout", [](const ImageSequence& s) { return s.info().layout; },
-          "kitti, euroc or uwslam.")
+          "kitti, euroc, uwslam or 4seasons.")
       .def_property_readonly("rig",
                              [](const ImageSequence& s) {
                                return CameraRig{s.info().stereo, s.info().fisheye};

@@ -104,6 +104,9 @@ std::unique_ptr<ImageSequence> open_euroc(const fs::path& path, const std::strin
                      mav.string(), options, info.warnings);
   const std::array<EurocCamera, 2> cameras = read_euroc_cameras(*folder, mav);
   const auto& [left, right] = cameras;
+  for (const EurocCamera& camera : cameras) {
+    if (!camera.note.empty()) info.warnings.push_back(camera.source + ": " + camera.note);
+  }
   check_image_size(first_image_size(frames.files), left.camera.size, left.source);
   auto rectifier = std::make_unique<const StereoRectifier>(
       left.camera, right.camera, inverse(right.body_from_cam) * left.body_from_cam, mav.string());

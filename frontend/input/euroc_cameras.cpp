@@ -116,6 +116,7 @@ std::array<EurocCamera, 2> read_camchain_pair(const fs::path& path) {
   for (std::size_t i = 0; i < 2; ++i) {
     cameras[i].camera = raw_camera(chain[i].camera, chain[i].radtan);
     cameras[i].source = path.string();
+    cameras[i].note = chain[i].note.empty() ? "" : chain[i].name + ": " + chain[i].note;
   }
   if (chain[0].camera_from_imu) cameras[0].body_from_cam = inverse(*chain[0].camera_from_imu);
   cameras[1].body_from_cam = cameras[0].body_from_cam * inverse(*chain[1].camera_from_previous);
@@ -129,7 +130,7 @@ std::array<EurocCamera, 2> read_basalt_pair(const fs::path& path) {
   std::array<EurocCamera, 2> cameras;
   for (std::size_t i = 0; i < 2; ++i) {
     cameras[i] = {raw_camera(all[i].camera, all[i].distortion), all[i].imu_from_camera,
-                  path.string()};
+                  path.string(), all[i].note};
   }
   return cameras;
 }

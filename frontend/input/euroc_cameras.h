@@ -13,6 +13,7 @@ struct EurocCamera {
   RawCamera camera;
   Rigid3d body_from_cam;
   std::string source;  // the file that says it
+  std::string note;    // how a lens of another model was taken; else empty
 };
 
 // A camera's sensor.yaml. Throws InputError.

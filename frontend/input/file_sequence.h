@@ -102,6 +102,9 @@ std::unique_ptr<ImageSequence> open_kitti_raw(const std::filesystem::path& path,
                                               const std::string& name, const InputOptions& options);
 std::unique_ptr<ImageSequence> open_euroc(const std::filesystem::path& path,
                                           const std::string& name, const InputOptions& options);
+std::unique_ptr<ImageSequence> open_four_seasons(const std::filesystem::path& path,
+                                                 const std::string& name,
+                                                 const InputOptions& options);
 std::unique_ptr<ImageSequence> open_uwslam(const std::filesystem::path& path,
                                            const std::string& name, SequenceCameras cameras,
                                            TruthConvention convention, const InputOptions& options);

@@ -23,22 +23,36 @@ bool says_nanoseconds(const fs::path& path) {
   return text.substr(0, text.find('\n')).find("[ns]") != std::string::npos;
 }
 
-// "time name", in any of the usual units: by the name without its folder and ending.
+// Whether the lines are "name time ..." (4Seasons, TUM's monocular dataset): of the last one the
+// first word is an image's name, the second is none.
+bool begins_with_names(const std::vector<TextLine>& lines, const std::vector<fs::path>& left) {
+  const std::vector<std::string_view> fields = split_fields(lines.back().text, ' ');
+  const auto is_name = [&](const fs::path& word) {
+    return std::any_of(left.begin(), left.end(),
+                       [&](const fs::path& image) { return image.stem() == word.stem(); });
+  };
+  return fields.size() > 1 && is_name(fields[0]) && !is_name(fields[1]);
+}
+
+// "time name" or "name time", in any of the usual units: by the name without its folder and ending.
 std::map<std::string, double> read_named_times(const fs::path& path,
+                                               const std::vector<fs::path>& left,
                                                std::vector<std::string>& warnings) {
   std::map<std::string, double> times;
   bool nanoseconds = says_nanoseconds(path);
-  for (const TextLine& line : read_lines(path)) {
+  const std::vector<TextLine> lines = read_lines(path);
+  const std::size_t name_at = begins_with_names(lines, left) ? 0 : 1;
+  for (const TextLine& line : lines) {
     const std::vector<std::string_view> fields = split_fields(line.text, ' ');
-    const bool is_row =
-        !fields.empty() && fields[0].find_first_not_of("0123456789.+-eE") == std::string_view::npos;
-    if (!is_row && times.empty()) continue;  // the columns' names
     if (fields.size() < 2) throw line_error(path, line.number, "expected a time and a name");
-    double time = parse_number(fields[0], path, line.number);
+    const std::string_view field = fields[1 - name_at];
+    const bool is_row = field.find_first_not_of("0123456789.+-eE") == std::string_view::npos;
+    if (!is_row && times.empty()) continue;  // the columns' names
+    double time = parse_number(field, path, line.number);
     if (times.empty() && time >= kLeastNanoseconds) nanoseconds = true;
     if (nanoseconds) time *= 1e-9;
-    if (!times.emplace(fs::path(fields[1]).stem().string(), time).second) {
-      throw line_error(path, line.number, quote(fields[1]) + " has a time already");
+    if (!times.emplace(fs::path(fields[name_at]).stem().string(), time).second) {
+      throw line_error(path, line.number, quote(fields[name_at]) + " has a time already");
     }
   }
   if (nanoseconds) warnings.push_back(path.string() + ": read as nanoseconds");
@@ -53,7 +67,7 @@ bool has_names(const fs::path& path) {
 
 std::vector<double> by_names(const fs::path& path, const std::vector<fs::path>& left,
                              std::vector<std::string>& warnings) {
-  const std::map<std::string, double> named = read_named_times(path, warnings);
+  const std::map<std::string, double> named = read_named_times(path, left, warnings);
   std::vector<double> times;
   for (const fs::path& image : left) {
     const auto found = named.find(image.stem().string());

@@ -27,6 +27,9 @@ std::unique_ptr<ImageSequence> open_layout(const fs::path& path, SequenceLayout 
   if (!sequence && (any || layout == SequenceLayout::kUwslam)) {
     sequence = open_uwslam(path, name, cameras, convention, options);
   }
+  if (!sequence && (any || layout == SequenceLayout::kFourSeasons)) {
+    sequence = open_four_seasons(path, name, options);
+  }
   return sequence;
 }
 
@@ -38,10 +41,13 @@ const char* expected_files(SequenceLayout layout) {
       return "no EuRoC sequence here (mav0/cam0/, mav0/cam1/)";
     case SequenceLayout::kUwslam:
       return "no UWslam sequence here (images/, times.txt, calibration/)";
+    case SequenceLayout::kFourSeasons:
+      return "no 4Seasons sequence here (undistorted_images/ or distorted_images/, times.txt)";
     case SequenceLayout::kAuto:
       break;
   }
-  return "no sequence in a known layout here (KITTI, EuRoC or UWslam)";
+  return "no sequence in a known layout here (KITTI, EuRoC, UWslam or 4Seasons; other folders are "
+         "given by --left, --right and --calibration)";
 }
 
 }  // namespace

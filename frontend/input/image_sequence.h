@@ -32,7 +32,7 @@ struct FrameImages {
 // What the dataset says about itself before any image is decoded.
 struct SequenceInfo {
   std::string name;
-  std::string layout;  // "kitti", "euroc" or "uwslam"
+  std::string layout;  // "kitti", "euroc", "uwslam", "4seasons" ...
   Calibrated<RectifiedStereo> stereo;
   std::optional<Calibrated<KannalaBrandt>> fisheye;  // none: there is no such camera
   std::vector<double> times;                         // one per frame [s], strictly ascending
@@ -62,7 +62,7 @@ class ImageSequence {
 // kAuto: the fisheye, if there is one.
 enum class SequenceCameras { kAuto, kStereo, kHybrid };
 
-enum class SequenceLayout { kAuto, kKitti, kEuroc, kUwslam };
+enum class SequenceLayout { kAuto, kKitti, kEuroc, kUwslam, kFourSeasons };
 
 // How the poses of UWslam's camera_poses.txt are meant: its documents contradict each other. kAuto
 // takes the meaning under which the two cameras are clearly closer together and look at one place;

@@ -11,6 +11,7 @@ void take_rectified_pair(const PairCalibration& pair, SequenceInfo& info) {
 std::unique_ptr<const StereoRectifier> take_raw_pair(const PairCalibration& pair,
                                                      SequenceInfo& info) {
   const RawPair& raw = pair.raw.value();
+  info.warnings.insert(info.warnings.end(), pair.notes.begin(), pair.notes.end());
   auto rectifier = std::make_unique<const StereoRectifier>(raw.left, raw.right, raw.right_from_left,
                                                            pair.source);
   if (!rectifier->note().empty()) info.warnings.push_back(rectifier->note());

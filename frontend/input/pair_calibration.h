@@ -19,8 +19,9 @@ struct RawPair {
 struct PairCalibration {
   std::optional<Calibrated<RectifiedStereo>> rectified;
   std::optional<RawPair> raw;
-  std::string source;          // the files, for messages
-  std::size_t files_used = 0;  // of those given, from the first on
+  std::string source;              // the files, for messages
+  std::vector<std::string> notes;  // how raw lenses of other models were taken
+  std::size_t files_used = 0;      // of those given, from the first on
 };
 
 // Takes the pair for one whose images are rectified already, or are to be rectified by what is

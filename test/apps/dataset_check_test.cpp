@@ -1,6 +1,7 @@
 #include "apps/dataset_check/pair_survey.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -190,6 +191,29 @@ TEST_CASE("check: gaps, black and damaged images, units") {
              "P1: 260 0 159.5 -31200 0 260 119.5 0 0 0 1 0\n");
   const Names found = findings(check(folder.path()).json);
   CHECK(std::count(found.begin(), found.end(), "units") == 1);
+}
+
+TEST_CASE("check: of colour images the channel that is asked for is read") {
+  const TempFolder folder;
+  write_kitti_survey(folder.path() / "data");
+  const double brightness = check(folder.path()).json["stereo"]["brightness"];
+  for (int i = 0; i < kSurveyFrames; ++i) {
+    for (const bool right : {false, true}) {
+      const std::string path = kitti_image(folder.path() / "data", right, i).string();
+      const cv::Mat grey = cv::imread(path, cv::IMREAD_GRAYSCALE);
+      const std::array<cv::Mat, 3> blue_green_red{grey / 2, grey, grey / 32};
+      cv::Mat colour;
+      cv::merge(blue_green_red.data(), 3, colour);
+      REQUIRE(cv::imwrite(path, colour));
+    }
+  }
+  const Checked green = check(folder.path(), {"--channel", "green"});
+  CHECK(green.json["stereo"]["brightness"] == brightness);
+  CHECK(findings(green.json).empty());
+  const Checked blue = check(folder.path(), {"--channel", "blue"});
+  CHECK(blue.json["stereo"]["brightness"].get<double>() == Approx(brightness / 2).margin(1));
+  const Names dead = findings(check(folder.path(), {"--channel", "red"}).json);
+  CHECK(std::count(dead.begin(), dead.end(), "dark") == 1);
 }
 
 TEST_CASE("check: with a fisheye") {

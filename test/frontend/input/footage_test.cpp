@@ -284,6 +284,96 @@ TEST_CASE("Own footage: Kalibr's and ORB-SLAM's pairs") {
   CHECK(bf.rectified->params[4] == Approx(0.1));
 }
 
+TEST_CASE("Own footage: lenses of other models in a pair are said to be taken as Kannala-Brandt") {
+  const TempFolder folder;
+  Footage footage = write_footage(folder.path(), kThree);
+  footage.rate = 5;
+  const std::string camera =
+      "  camera_model: ds\n  distortion_model: none\n  distortion_coeffs: []\n"
+      "  intrinsics: [-0.2, 0.55, 40, 40, 47.5, 31.5]\n  resolution: [96, 64]\n";
+  footage.calibration = {(folder.path() / "chain.yaml").string()};
+  write_text(footage.calibration[0],
+             "cam0:\n" + camera + "cam1:\n" + camera +
+                 "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  const auto warnings = open_footage(footage, FootageImages::kRaw, {})->info().warnings;
+  REQUIRE(warnings.size() >= 2);
+  check_holds(warnings[0], "chain.yaml: cam0: double sphere, taken as Kannala-Brandt");
+  check_holds(warnings[1], "chain.yaml: cam1: double sphere, taken as Kannala-Brandt");
+}
+
+// Raw cameras turned by 0.01 to either side, as ORB-SLAM2 and stella_vslam have them.
+TEST_CASE("Own footage: settings of programs that rectify hold of raw and of rectified images") {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "settings.yaml").string();
+  const double c = std::cos(0.01), s = std::sin(0.01);
+  const auto check_pair = [&](const std::string& text) {
+    INFO(text);
+    write_text(path, text);
+    const PairCalibration pair = read_pair_calibration({path}, false, {96, 64});
+    REQUIRE(pair.rectified);
+    CHECK(pair.rectified->params[0] == 80);
+    CHECK(pair.rectified->params[3] == 31.5);
+    CHECK(pair.rectified->params[4] == Approx(0.11));
+    REQUIRE(pair.raw);
+    CHECK(pair.raw->left.fx == 82);
+    CHECK(pair.raw->left.cy == 33);
+    CHECK(pair.raw->right.distortion == std::vector<double>{-0.1, 0.01, 0, 0, 0.5});
+    CHECK(pair.raw->left.size == ImageSize{96, 64});
+    const Rigid3d& right_from_left = pair.raw->right_from_left;
+    CHECK(right_from_left.rotation().angularDistance(Eigen::Quaterniond::Identity()) ==
+          Approx(0.02));
+    CHECK(right_from_left.translation().norm() == Approx(0.11));
+    CHECK(right_from_left.translation().x() == Approx(-0.11 * c));
+  };
+  const auto opencv = [](const std::string& key, const std::string& size, const std::string& data) {
+    return key + ": !!opencv-matrix\n  " + size + "\n  dt: d\n  data: " + data;
+  };
+  const std::string k = numbers({82, 0, 46, 0, 82, 33, 0, 0, 1});
+  const std::string d = numbers({-0.1, 0.01, 0, 0, 0.5});
+  const std::string left = numbers({c, 0, s, 0, 1, 0, -s, 0, c});
+  const std::string right = numbers({c, 0, -s, 0, 1, 0, s, 0, c});
+  std::string orb =
+      "%YAML:1.0\nCamera.fx: 80.0\nCamera.fy: 80.0\nCamera.cx: 47.5\nCamera.cy: 31.5\n"
+      "Camera.bf: 8.8\n";
+  for (const std::string side : {"LEFT", "RIGHT"}) {
+    orb += side + ".height: 64\n" + side + ".width: 96\n" +
+           opencv(side + ".D", "rows: 1\n  cols: 5", d) +
+           opencv(side + ".K", "rows: 3\n  cols: 3", k) +
+           opencv(side + ".R", "rows: 3\n  cols: 3", side == "LEFT" ? left : right);
+  }
+  check_pair(orb);
+
+  const auto stella = [&](const std::string& section, const std::string& rectifier) {
+    std::string text = section.empty() ? "Camera:\n" : "";
+    const std::string before = section.empty() ? "  " : "Camera.";
+    for (const char* const line :
+         {"name: \"a\"", "setup: \"stereo\"", "model: \"perspective\"", "fx: 80.0", "fy: 80.0",
+          "cx: 47.5", "cy: 31.5", "k1: 0.0", "fps: 20.0", "cols: 96", "rows: 64",
+          "focal_x_baseline: 8.8", "color_order: \"Gray\""}) {
+      text += before + line + "\n";
+    }
+    if (rectifier.empty()) return text;
+    text += section.empty() ? "StereoRectifier:\n" : "";
+    const std::string in = section.empty() ? "  " : "StereoRectifier.";
+    for (const std::string side : {"left", "right"}) {
+      text += in + "K_" + side + ": " + k + in + "D_" + side + ": " + d + in + "R_" + side + ": " +
+              (side == "left" ? left : right);
+    }
+    return text;
+  };
+  check_pair(stella("", "with"));
+  check_pair(stella("Camera", "with"));  // as OpenVSLAM wrote it
+  write_text(path, stella("", ""));
+  const PairCalibration rectified = read_pair_calibration({path}, false, {96, 64});
+  CHECK(rectified.rectified->params[4] == Approx(0.11));
+  CHECK(!rectified.raw);
+  write_text(path, "Camera:\n  model: \"fisheye\"\n  focal_x_baseline: 8\n");
+  check_holds(complaint([&] {
+                read_pair_calibration({path}, false, {96, 64});
+              }),
+              "settings.yaml:2: Camera.model: 'fisheye' is not supported of a rectified pair");
+}
+
 TEST_CASE("Own footage: Basalt's pair") {
   const TempFolder folder;
   const fs::path path = folder.path() / "basalt.json";
@@ -335,6 +425,62 @@ TEST_CASE("Own footage: Basalt's pair") {
   check_holds(refusal_of(footage, FootageImages::kRaw), "has one camera, and a pair has two");
 }
 
+TEST_CASE("Own footage: DSO's cameras") {
+  const TempFolder folder;
+  const fs::path left = folder.path() / "calib_0.txt", right = folder.path() / "calib_1.txt";
+  const fs::path between = folder.path() / "calib_stereo.txt";
+  const auto read = [&] {
+    return read_pair_calibration({left.string(), right.string(), between.string()}, false,
+                                 {96, 64});
+  };
+  write_text(left, "Pinhole 80 80 47.5 31.5 0.0 0.0\n96 64\ncrop\n96 64\n");
+  write_text(right, "Pinhole 80 80 47.5 31.5 0\n96 64\n");
+  write_text(between, "1 0 0 -0.12\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  const PairCalibration rectified = read();
+  CHECK(rectified.files_used == 3);
+  REQUIRE(rectified.rectified);
+  CHECK(rectified.rectified->params == std::array<double, 5>{80, 80, 47.5, 31.5, 0.12});
+  CHECK(!rectified.raw);
+
+  write_text(right, "Pinhole 81 80 47.5 31.5 0\n96 64\n");  // no longer alike
+  REQUIRE(read().raw);
+  CHECK(read().raw->right.fx == 81);
+  CHECK(read().raw->right_from_left.translation().x() == Approx(-0.12));
+
+  // As fractions of the image, counted from its corner.
+  write_text(left, "EquiDistant 0.5 0.75 0.5 0.5 0.1 0.02 0.003 0.0004\n96 64\n0.4 0.5\n96 64\n");
+  write_text(right, "RadTan 80 80 47.5 31.5 -0.1 0.02 0.003 0.004\n96 64\n");
+  const RawPair raw = read().raw.value();
+  CHECK(raw.left.is_fisheye);
+  CHECK(raw.left.fx == 48);
+  CHECK(raw.left.fy == 48);
+  CHECK(raw.left.cx == 47.5);
+  CHECK(raw.left.cy == 31.5);
+  CHECK(raw.left.distortion == std::vector<double>{0.1, 0.02, 0.003, 0.0004});
+  CHECK(!raw.right.is_fisheye);
+  CHECK(raw.right.distortion == std::vector<double>{-0.1, 0.02, 0.003, 0.004});
+
+  const auto refused = [&](const fs::path& path, const std::string& text) {
+    const std::string before = read_text(path);
+    write_text(path, text);
+    const std::string line = complaint(read);
+    write_text(path, before);
+    return line;
+  };
+  check_holds(refused(left, "FOV 0.5 0.5 0.5 0.5 0.9\n96 64\n"),
+              "calib_0.txt:1: the camera model \"FOV\" is not supported (Pinhole, RadTan,");
+  check_holds(refused(left, "Pinhole 80 80 47.5 31.5 0.1\n96 64\n"), "Pinhole has 4 numbers");
+  check_holds(refused(left, "RadTan 80 80 47.5\n96 64\n"), "RadTan has 8 numbers");
+  check_holds(refused(right, "Pinhole 80 80 47.5 31.5\n"), "calib_1.txt: expected a line of");
+  check_holds(refused(right, "Pinhole 80 80 47.5 31.5\n96 -64\n"), "calib_1.txt:2: is no size");
+  check_holds(refused(between, "1 0 0\n0 1 0\n"), "calib_stereo.txt: expected a matrix of 4x4");
+  check_holds(refused(between, "2 0 0 1\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"), "is not a rotation");
+  check_holds(complaint([&] {
+                read_pair_calibration({left.string()}, false, {96, 64});
+              }),
+              "that of the right one and the 4x4 matrix right_from_left must follow");
+}
+
 TEST_CASE("Own footage: times") {
   const TempFolder folder;
   Footage footage = write_footage(folder.path(), {"left_010", "left_012", "left_013"});
@@ -360,6 +506,9 @@ TEST_CASE("Own footage: times") {
              "#timestamp [ns],filename\n1000000000,left_010.png\n1100000000,left_012.png\n"
              "1200000000,left_013.png\n");
   CHECK(open_rectified(footage)->info().times[1] == Approx(1.1));
+  // The name first, and an exposure behind.
+  write_text(footage.times, "left_010 1.5 6.9\nleft_012 2.0 7.1\nleft_013 3.25 7\n");
+  CHECK(open_rectified(footage)->info().times == std::vector<double>{1.5, 2, 3.25});
   write_text(footage.times, "2011-09-26 13:02:25.5\n2011-09-26 13:02:26\n2011-09-26 13:02:27\n");
   CHECK(open_rectified(footage)->info().times[0] == 1317042145.5);
 

@@ -327,6 +327,35 @@ const char* const kRawCalibration =
     "calib_time: 09-Jan-2012 13:57:47\nR_rect_00: 1 0 0 0 1 0 0 0 1\n"
     "P_rect_00: 700 0 30 0 0 700 20 0 0 0 1 0\nP_rect_01: 700 0 30 -350 0 700 20 0 0 0 1 0\n";
 
+TEST_CASE("one channel of a sequence's colour images is taken for grey") {
+  const TempFolder folder;
+  write_kitti(folder.path());
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path() / "sequences/07")) {
+    if (entry.path().extension() != ".png") continue;
+    const cv::Mat picture = cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE);
+    // Red is dead, as under water; green and blue differ.
+    const std::array<cv::Mat, 3> blue_green_red{255 - picture, picture, 0 * picture};
+    cv::Mat colour;
+    cv::merge(blue_green_red.data(), 3, colour);
+    write_picture(entry.path(), colour);
+  }
+  const auto open = [&](GrayChannel channel) {
+    InputOptions options;
+    options.images.channel = channel;
+    return open_sequence(folder.path().string(), SequenceLayout::kAuto, "",
+                         SequenceCameras::kStereo, TruthConvention::kAuto, options);
+  };
+  const cv::Mat left = test_picture(60, 40, 2), right = test_picture(60, 40, 3);
+  CHECK(holds(open(GrayChannel::kGreen)->read(1).left, left));
+  CHECK(holds(open(GrayChannel::kGreen)->read(1).right, right));
+  CHECK(holds(open(GrayChannel::kBlue)->read(1).left, 255 - left));
+  const auto red = open(GrayChannel::kRed);
+  CHECK(holds(red->read(1).left, 0 * left));
+  REQUIRE(red->info().warnings.size() == 1);
+  CHECK(red->info().warnings[0].find("the left images are black") != std::string::npos);
+  CHECK(open(GrayChannel::kGrey)->info().warnings.empty());
+}
+
 TEST_CASE("KITTI raw opens, with truth from its GPS and IMU") {
   const TempFolder folder;
   const fs::path date = folder.path() / "2011_09_26", drive = date / "2011_09_26_drive_0001_sync";
