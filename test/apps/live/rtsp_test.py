@@ -132,6 +132,15 @@ class Slam:
             check(self.changed.wait_for(lambda: text in self.said or self.process.poll() is not None, PATIENCE) and text in self.said,
                   "it says \"%s\", not \"%s\"" % (text, self.said))
 
+    def waited(self):
+        """For a core, all threads together [s]."""
+        tasks = "/proc/%d/task" % self.process.pid
+        total = 0
+        for task in os.listdir(tasks):
+            with open(os.path.join(tasks, task, "schedstat"), encoding="utf-8") as file:
+                total += int(file.read().split()[1])
+        return total / 1e9
+
     def end(self):
         self.process.send_signal(signal.SIGINT)
         check(self.process.wait(PATIENCE) == 0, "exit code %s: %s" % (self.process.returncode, self.said))
@@ -194,6 +203,7 @@ def try_case(name, program, evaluate, dataset, frames, of_files):
                 cameras.go()
             check(cameras.process.stdout.readline() == "over\n", "all was sent")
             time.sleep(3)  # what a decoder holds
+            waited = slam.waited()
             slam.end()
         finally:
             cameras.stop()
@@ -206,7 +216,8 @@ def try_case(name, program, evaluate, dataset, frames, of_files):
     live, counts = summary["live"], summary["frames"]
     print("%s: %d sets, %d tracked, %d lost, %d dropped + %s before; %d of %d frames of the sequence, ATE %.4f cm (files: %.4f); grey levels off by %.2f" % (
         name, live["sets"], counts["tracked"], counts["lost"], counts["dropped"], live["dropped"], len(found), frames, ate, of_files, off))
-    print("    lost streams: %s" % live["lost"], flush=True)
+    print("    lost streams: %s; held up: %s; alone: %s; its threads waited %.1f s for a core" % (
+        live["lost"], live["held_up"], live["alone"], waited), flush=True)
     check(counts["lost"] == 0, "no frame is lost")
     check(counts["tracked"] == counts["read"] - counts["corrupt"], "what was not dropped is tracked")
     check(live["lost"]["left"] >= int(cut), "a stream that is cut is said to be lost")
