@@ -29,20 +29,33 @@ foreach(program IN LISTS HS_PROGRAMS)
           COMPONENT programs)
 endforeach()
 
-# A man page is what a program says of itself.
+# A man page is what a program, or one of its commands, says of itself.
 find_program(HELP2MAN help2man)
 find_program(GZIP gzip)
+function(man_page name program purpose)  # [COMMAND]
+  set(page ${PROJECT_BINARY_DIR}/man/${name}.1)
+  string(STRIP "${ARGN} --help" help)
+  add_custom_command(OUTPUT ${page}.gz
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/man
+    COMMAND ${HELP2MAN} --no-info --section 1 --source "hybrid_slam ${PROJECT_VERSION}" --name ${purpose}
+            --help-option ${help} --version-string "${name} ${PROJECT_VERSION}" --output ${page} $<TARGET_FILE:${program}>
+    COMMAND ${GZIP} --best --no-name --force ${page}
+    DEPENDS ${program} VERBATIM)
+  set_property(GLOBAL APPEND PROPERTY HS_MAN_PAGES ${page}.gz)
+endfunction()
 if(HELP2MAN AND GZIP)
-  foreach(program IN LISTS HS_PROGRAMS)
-    set(page ${PROJECT_BINARY_DIR}/man/${program}.1)
-    add_custom_command(OUTPUT ${page}.gz
-      COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/man
-      COMMAND ${HELP2MAN} --no-info --section 1 --source "hybrid_slam ${PROJECT_VERSION}" --name "visual SLAM"
-              --output ${page} $<TARGET_FILE:${program}>
-      COMMAND ${GZIP} --best --no-name --force ${page}
-      DEPENDS ${program} VERBATIM)
-    list(APPEND pages ${page}.gz)
-  endforeach()
+  man_page(hybrid_slam hybrid_slam "visual SLAM of a stereo pair and a fisheye")
+  man_page(hybrid_slam-live hybrid_slam "visual SLAM on what cameras see now" live)
+  man_page(hybrid_slam-check hybrid_slam "what a dataset is fit for" check)
+  man_page(map_optimizer map_optimizer "bundle adjustment of a map or a problem in a file")
+  man_page(map_tool map_tool "looks into maps, checks, cuts, exports and merges them")
+  man_page(trajectory_eval trajectory_eval "compares a trajectory with the true one")
+  man_page(vocabulary_trainer vocabulary_trainer "makes vocabularies for finding places again")
+  man_page(feature_eval feature_eval "how well features of images match")
+  if(HYBRID_SLAM_RENDERER)
+    man_page(scene_renderer scene_renderer "renders datasets with exact truth")
+  endif()
+  get_property(pages GLOBAL PROPERTY HS_MAN_PAGES)
   add_custom_target(man_pages DEPENDS ${pages})
   add_dependencies(packaged man_pages)
   install(FILES ${pages} DESTINATION share/man/man1 COMPONENT programs OPTIONAL)

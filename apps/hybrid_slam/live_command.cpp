@@ -17,6 +17,7 @@
 #include "apps/slam/live/watched_source.h"
 #include "apps/slam/log.h"
 #include "cameras/files/input_error.h"
+#include "frontend/input/text_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -80,12 +81,12 @@ Json by_camera(const PerCamera<std::int64_t>& counts) {
 class LiveInput final : public RunInput {
  public:
   LiveInput(const LiveLine& line, std::unique_ptr<SetSource> source, LiveCameras cameras,
-            const std::stop_token& stop)
-      : line_(line), source_(std::move(source)), cameras_(std::move(cameras)), stop_(stop) {
-    if (line.record.empty()) return;
-    recorder_.emplace(line.record, line.run.input.footage.calibration,
-                      cameras_.info.fisheye.has_value());
-  }
+            std::optional<SetRecorder> recorder, const std::stop_token& stop)
+      : line_(line),
+        source_(std::move(source)),
+        cameras_(std::move(cameras)),
+        stop_(stop),
+        recorder_(std::move(recorder)) {}
 
   const SequenceInfo& info() const override { return cameras_.info; }
 
@@ -176,9 +177,15 @@ class LiveInput final : public RunInput {
   std::unique_ptr<ImageSequence> pictures_;
 };
 
+// What of the command line cannot be used is said before the cameras are waited for.
 int run(const LiveLine& line, const Interrupt& interrupt) {
   PreparedRun prepared = prepare_run(line.run);
   begin_outputs(line.run);
+  for (const std::string& file : line.run.input.footage.calibration) read_text_file(file);
+  std::optional<SetRecorder> recorder;
+  if (!line.record.empty()) {
+    recorder.emplace(line.record, line.run.input.footage.calibration, !line.fisheye.empty());
+  }
   auto source = line.watch.empty() ? open_streams(line) : open_folder(line);
   source->set_tell([&](const std::string& text) {
     log_of(LogRoom::kInput).info(text);
@@ -193,7 +200,8 @@ int run(const LiveLine& line, const Interrupt& interrupt) {
     spdlog::warn("interrupted before the first images came");
     return kExitInterrupted;
   }
-  LiveInput input(line, std::move(source), std::move(*cameras), interrupt.token());
+  LiveInput input(line, std::move(source), std::move(*cameras), std::move(recorder),
+                  interrupt.token());
   const int exit_code = run_slam(line.run, std::move(prepared), input, {});
   const std::string replay = input.replay_command();
   if (!replay.empty()) fmt::print("recorded   replay it by: {}\n", replay);

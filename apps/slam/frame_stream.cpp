@@ -9,6 +9,9 @@ namespace {
 // Inputs of a camera that wait for a thread at most, where the oldest are dropped.
 constexpr std::ptrdiff_t kBacklog = 2;
 
+// Likewise until a session has caught up with what came while it started.
+constexpr std::ptrdiff_t kStartBacklog = 10;
+
 // Inputs left out that wait to be told at most; more are counted alone.
 constexpr std::size_t kLeftOutBacklog = 1000;
 
@@ -114,7 +117,9 @@ void FrameStream::append(SensorInput input) {
 
 void FrameStream::drop_oldest(CameraKind camera) {
   const auto droppable = [&](const Released& one) { return one.camera == camera && !one.first; };
-  if (std::count_if(released_.begin(), released_.end(), droppable) <= kBacklog) return;
+  const auto waiting = std::count_if(released_.begin(), released_.end(), droppable);
+  caught_up_ = caught_up_ || waiting > kStartBacklog;
+  if (!caught_up_ || waiting <= kBacklog) return;
   const auto oldest = std::find_if(released_.begin(), released_.end(), droppable);
   leave_out(camera, oldest->time, kDropped);
   released_.erase(oldest);
@@ -151,6 +156,7 @@ std::optional<FrameStream::Released> FrameStream::take(Lock& lock) {
       }
       Released input = std::move(released_.front());
       released_.pop_front();
+      caught_up_ = caught_up_ || released_.empty();
       return input;
     }
     if (const auto due = buffer_.next_due()) {

@@ -126,7 +126,8 @@ class FrameStream {
   bool settle_now_ = false;  // with the first images that are here
   bool closed_ = false;
   bool cancelled_ = false;
-  bool starting_ = false;  // a thread makes the extractor
+  bool starting_ = false;   // a thread makes the extractor
+  bool caught_up_ = false;  // with what came while the first images settled how to extract
   std::exception_ptr failure_;
   std::unique_ptr<FrameExtractor> extractor_;  // does not change once it is there
   std::vector<std::jthread> threads_;          // last: joined before the rest goes

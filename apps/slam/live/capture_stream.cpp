@@ -1,6 +1,9 @@
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <set>
 #include <span>
 #include <system_error>
 
@@ -25,6 +28,17 @@ std::string find_program() {
     if (!error && fs::exists(place)) return place.string();
   }
   return kProgram;
+}
+
+// "; this machine has /dev/video0, /dev/video2", for who asked for another.
+std::string cameras_here() {
+  std::set<std::string> cameras;
+  std::error_code error;
+  for (const fs::directory_entry& device : fs::directory_iterator("/dev", error)) {
+    if (device.path().filename().string().starts_with("video")) cameras.insert(device.path());
+  }
+  return fmt::format("; this machine has {}",
+                     cameras.empty() ? "none" : fmt::to_string(fmt::join(cameras, ", ")));
 }
 
 template <typename T>
@@ -82,8 +96,9 @@ std::unique_ptr<ImageStream> open_stream(const std::string& name, double timeout
   const std::string path = is_device_number(name) ? "/dev/video" + name : name;
   const bool has_path = kind == StreamKind::kDevice || kind == StreamKind::kFile;
   if (has_path && !fs::exists(path)) {
-    throw InputError(name + (kind == StreamKind::kDevice ? ": no such camera (" + path + ")"
-                                                         : ": no such file or camera"));
+    throw InputError(kind == StreamKind::kDevice
+                         ? path + ": no such camera" + cameras_here()
+                         : name + ": no such video; streams are named as in rtsp://...");
   }
   try {
     return std::make_unique<CaptureStream>(name, timeout, channel);

@@ -105,7 +105,7 @@ bool SetPairing::settle(LiveCamera camera) {
 }
 
 bool SetPairing::is_enough(const Stamps& left, const Stamps& other) const {
-  if (closed_ || (left.size() >= kSettling && other.size() >= kSettling)) return true;
+  if (closed_ || (left.size() >= wanted_ && other.size() >= wanted_)) return true;
   if (options_.stamps == StampKind::kArrival) return false;
   const std::vector<double> differences = nearest_differences(left, other);
   return std::count_if(differences.begin(), differences.end(),
@@ -206,8 +206,20 @@ bool SetPairing::add_fisheye(ImageSet& set) {
   return fisheye.away || closed_ || pairs_.size() > 1;
 }
 
+// Arrivals that are unclear at first may have been jolted: more of them are looked at together.
+bool SetPairing::settle_patiently() {
+  try {
+    return settle();
+  } catch (const InputError&) {
+    const bool more = options_.stamps == StampKind::kArrival && !started_ && !closed_;
+    if (!more || 2 * wanted_ > options_.most_waiting) throw;
+    wanted_ *= 2;
+    return false;
+  }
+}
+
 std::optional<ImageSet> SetPairing::take() {
-  if (!settle()) return std::nullopt;
+  if (!settle_patiently()) return std::nullopt;
   pair();
   if (pairs_.empty() || !add_fisheye(pairs_.front())) return std::nullopt;
   ImageSet set = std::move(pairs_.front());

@@ -29,7 +29,8 @@ struct PairingOptions {
 // arrival: two images belong together if they come within half a frame period. That is clear where
 // the cameras' difference is the same for nine images of ten, to a quarter of the period, and both
 // it and its spread leave room to half a period; else it is refused. The first kSettling images of
-// each camera settle that, and are gone; later ones are looked at all the time. Images with
+// each camera settle that, or twice or four times as many where those were unclear, and are gone;
+// later ones are looked at all the time. Images with
 // sensors' stamps wait until it is settled: two pairs within half a millisecond do.
 class SetPairing {
  public:
@@ -76,6 +77,7 @@ class SetPairing {
   };
 
   bool settle();
+  bool settle_patiently();
   bool settle(LiveCamera camera);
   bool is_enough(const Stamps& left, const Stamps& other) const;
   StampMatch match_of(LiveCamera camera, const Stamps& left, const Stamps& other);
@@ -90,7 +92,8 @@ class SetPairing {
   std::deque<ImageSet> pairs_;  // without their fisheye yet
   PerCamera<std::int64_t> alone_{};
   std::vector<std::string> notes_;
-  bool started_ = false;  // it was clear once
+  std::size_t wanted_ = kSettling;  // images of each camera
+  bool started_ = false;            // it was clear once
   bool closed_ = false;
 };
 

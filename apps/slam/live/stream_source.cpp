@@ -156,9 +156,11 @@ void StreamSource::look_for_silence() {
     const State& state = of(states_, camera);
     if (!state.used) continue;
     if (!state.delivered && seconds(now - grab_.clock.start) > options_.timeout) {
-      throw InputError(fmt::format("{}: the {} camera delivers nothing: no image in {:g} s{}",
-                                   state.name, to_string(camera), options_.timeout,
-                                   state.why.empty() ? "" : " (" + state.why + ")"));
+      throw InputError(
+          fmt::format("{}: the {} camera delivers nothing: no image in {:g} s{}; "
+                      "--timeout waits longer",
+                      state.name, to_string(camera), options_.timeout,
+                      state.why.empty() ? "" : " (" + state.why + ")"));
     }
     const double silence = seconds(now - state.last);
     if (!state.delivered || state.ends || inbox_->waiting(camera) > 0) continue;

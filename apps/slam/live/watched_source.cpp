@@ -228,11 +228,24 @@ void WatchedSource::look_for_silence() {
   }
   for (const LiveCamera camera : kAllLiveCameras) {
     if (of(folders_, camera).source.empty() || of(counts_.images, camera) > 0) continue;
-    throw InputError(fmt::format("{}: no image of the {} camera came in {:g} s",
-                                 of(folders_, camera).source, to_string(camera), options_.timeout));
+    throw InputError(
+        fmt::format("{}: no image of the {} camera came in {:g} s; --timeout waits longer",
+                    of(folders_, camera).source, to_string(camera), options_.timeout));
   }
-  throw InputError(options_.left + ": " +
-                   (unclear_.empty() ? "no images came that belong together" : unclear_));
+  throw InputError(options_.left + ": " + why_nothing_belongs_together());
+}
+
+// As if no more would come.
+std::string WatchedSource::why_nothing_belongs_together() const {
+  if (!unclear_.empty()) return unclear_;
+  SetPairing all = pairing_;
+  all.close();
+  try {
+    all.take();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no images came that belong together; --timeout waits longer";
 }
 
 LiveCounts WatchedSource::counts() const {

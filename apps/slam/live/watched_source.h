@@ -56,6 +56,7 @@ class WatchedSource final : public SetSource {
   bool load(ImageSet& set);
   GrayImage read(const StampedImage& image);
   void look_for_silence();
+  std::string why_nothing_belongs_together() const;
 
   const WatchOptions options_;
   SetPairing pairing_;

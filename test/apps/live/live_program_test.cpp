@@ -167,8 +167,8 @@ TEST_CASE("live: what cannot be used ends in one line") {
     check_refused(run_program(HYBRID_SLAM, live(arguments), folder.path()), code, reason);
   };
   // Whichever is found missing first.
-  refused({"--left", "77", "--right", "78"}, 3, "no such camera (/dev/video7");
-  refused({"--left", "a.mp4", "--right", "b.mp4"}, 3, ".mp4: no such file or camera");
+  refused({"--left", "77", "--right", "78"}, 3, ": no such camera; this machine has");
+  refused({"--left", "a.mp4", "--right", "b.mp4"}, 3, ".mp4: no such video");
   refused(
       {"--left", "udp://127.0.0.1:39871", "--right", "udp://127.0.0.1:39872", "--timeout", "0.5"},
       3, "delivers nothing: no image in 0.5 s");
@@ -178,6 +178,14 @@ TEST_CASE("live: what cannot be used ends in one line") {
           "appsink: the left camera delivers nothing");
   refused({"--watch", "nowhere"}, 3, "nowhere: no such folder");
   refused({"--watch", "dive", "--timeout", "0.5"}, 3, "no image of the left camera came in 0.5 s");
+  fs::create_directories(folder.path() / "kept/left/old");
+  refused({"--left", "udp://127.0.0.1:39871", "--split", "--record", "kept"}, 3,
+          "kept/left: holds something already");
+  check_refused(run_program(HYBRID_SLAM,
+                            {"live", "--left", "udp://127.0.0.1:39871", "--split", "--calibration",
+                             "nowhere.yaml"},
+                            folder.path()),
+                3, "nowhere.yaml: ");
   refused({"--left", "0"}, 2, "--left needs --right, or --split");
   refused({"--left", "0", "--right", "1", "--split"}, 2, "--split and --right");
   refused({}, 2, "--left is required, or --watch");
@@ -189,7 +197,7 @@ TEST_CASE("live: what cannot be used ends in one line") {
                       fmt::format("{}.png", kStart + 7'100'000'000LL + i * 200'000'001LL));
   }
   refused({"--watch", "dive", "--right", "late", "--timeout", "1"}, 3,
-          "dive/left: no images came that belong together");
+          "dive/left: left and right have no times in common: the least difference is 5.7e+03 ms");
   fs::remove_all(folder.path() / "dive/left");
   fs::copy(folder.path() / "dive/fisheye", folder.path() / "dive/left");
   refused({"--watch", "dive"}, 3, "320x240");

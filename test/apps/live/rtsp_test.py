@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The stereo pair of H1 from two RTSP cameras, and by GStreamer pipelines: every frame that came is tracked, as exactly as from files.
+"""H1 from two and three RTSP cameras, and by GStreamer pipelines: every frame that came is tracked, as exactly as from files.
 
 rtsp_test.py HYBRID_SLAM TRAJECTORY_EVAL [CASE...]     the data are in the folder HYBRID_SLAM_DATA
 
@@ -22,14 +22,20 @@ PYTHON = "/usr/bin/python3"  # Debian's, which has its packages
 RATE = 3  # [Hz]
 THUMB = (32, 24)
 PATIENCE = 600  # [s]
+SIDES = ("left", "right", "fisheye")
+IMAGES = {"left": "%d_left.jpg", "right": "%d_right.jpg", "fisheye": "%d_fish.jpg"}
+CALIBRATION = {"left": "left_camera.yaml", "right": "right_camera.yaml", "fisheye": "fisheye_calib.yaml"}
 LOSSLESS = ["-qp", "0", "-preset", "ultrafast", "-pix_fmt", "gray"]
 LOSSY = ["-b:v", "4M", "-maxrate", "4M", "-bufsize", "4M", "-pix_fmt", "yuv420p"]
-RTSP = ("rtsp://127.0.0.1:{rtsp}/left", "rtsp://127.0.0.1:{rtsp}/right")
+RTSP = tuple("rtsp://127.0.0.1:{rtsp}/" + side for side in SIDES[:2])
+RTSP_HYBRID = tuple("rtsp://127.0.0.1:{rtsp}/" + side for side in SIDES)
 PIPELINE = tuple("tcpclientsrc host=127.0.0.1 port={%s} ! h264parse ! avdec_h264 ! videoconvert ! appsink sync=false" % side
-                 for side in ("left", "right"))
+                 for side in SIDES[:2])
 CASES = {  # options of the encoder, the streams, whether they are cut; ATE at most [cm], or none: 1.2 times that of files
     "rtsp_lossless": (LOSSLESS, RTSP, False, None),
     "rtsp_4M_cut": (LOSSY, RTSP, True, 0.1),
+    "hybrid_lossless": (LOSSLESS, RTSP_HYBRID, False, None),
+    "hybrid_4M": (LOSSY, RTSP_HYBRID, False, 0.1),
     "gstreamer_lossless": (LOSSLESS, PIPELINE, False, None),
     "gstreamer_4M": (LOSSY, PIPELINE, False, 0.1),
 }
@@ -67,7 +73,7 @@ def encode(images, frames, side, options, path):
     listed = path + ".txt"
     with open(listed, "w", encoding="utf-8") as file:
         for i in [0, 0, 0, *range(frames)]:
-            file.write("file '%s'\n" % os.path.join(images, "%d_%s.jpg" % (i, side)))
+            file.write("file '%s'\n" % os.path.join(images, IMAGES[side] % i))
     run(["ffmpeg", "-v", "error", "-r", str(RATE), "-f", "concat", "-safe", "0", "-i", listed, "-vf", "format=gray", "-c:v", "libx264",
          *options, "-bf", "0", "-g", "3", "-x264-params", "aud=1:scenecut=0", "-r", str(RATE), "-f", "h264", path])
 
@@ -90,7 +96,7 @@ class Cameras:
     """The server, in a process of its own."""
 
     def __init__(self, port, files, start):
-        script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "stereo_streams.py")
+        script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "camera_streams.py")
         self.process = subprocess.Popen([PYTHON, script, str(port), str(RATE), str(start), *files], stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True)
         check(self.process.stdout.readline() == "ready\n", "the cameras are there")
@@ -106,10 +112,11 @@ class Cameras:
 
 class Slam:
     def __init__(self, program, dataset, streams, folder):
-        calibration = [os.path.join(dataset, "calibration", name + "_camera.yaml") for name in ("left", "right")]
-        self.process = subprocess.Popen(
-            [program, "live", "--left", streams[0], "--right", streams[1], "--calibration", *calibration, "--record", "kept", "--timeout", "60",
-             "--out", "out", "--quiet"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        command = [program, "live", "--record", "kept", "--timeout", "60", "--out", "out", "--quiet"]
+        for side, stream in streams.items():
+            command += ["--" + side, stream]
+        command += ["--calibration", *(os.path.join(dataset, "calibration", CALIBRATION[side]) for side in streams)]
+        self.process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         self.said, self.changed = "", threading.Condition()
         self.listener = threading.Thread(target=self.listen, daemon=True)
         self.listener.start()
@@ -124,6 +131,15 @@ class Slam:
         with self.changed:
             check(self.changed.wait_for(lambda: text in self.said or self.process.poll() is not None, PATIENCE) and text in self.said,
                   "it says \"%s\", not \"%s\"" % (text, self.said))
+
+    def waited(self):
+        """For a core, all threads together [s]."""
+        tasks = "/proc/%d/task" % self.process.pid
+        total = 0
+        for task in os.listdir(tasks):
+            with open(os.path.join(tasks, task, "schedstat"), encoding="utf-8") as file:
+                total += int(file.read().split()[1])
+        return total / 1e9
 
     def end(self):
         self.process.send_signal(signal.SIGINT)
@@ -140,7 +156,7 @@ def by_content(folder, images, frames):
     """stereo.tum with the times of the sequence: each of its frames once. Also how far off their contents are [grey levels, median]."""
     names = sorted(os.listdir(os.path.join(folder, "kept", "left")))
     kept = thumbs(["-f", "image2", "-pattern_type", "glob", "-i", os.path.join(folder, "kept", "left", "*.png")])
-    source = thumbs(["-f", "image2", "-start_number", "0", "-i", os.path.join(images, "%d_left.jpg")])[:frames]
+    source = thumbs(["-f", "image2", "-start_number", "0", "-i", os.path.join(images, IMAGES["left"])])[:frames]
     shapes = [normal(thumb) for thumb in source]
     check(len(kept) == len(names), "all that were recorded")
     with open(os.path.join(folder, "out", "stereo.tum"), encoding="utf-8") as file:
@@ -167,13 +183,16 @@ def try_case(name, program, evaluate, dataset, frames, of_files):
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     with tempfile.TemporaryDirectory() as folder:
-        files = [os.path.join(folder, side + ".h264") for side in ("left", "right")]
-        for side, path in zip(("left", "right"), files):
+        sides = SIDES[:len(streams)]
+        files = [os.path.join(folder, side + ".h264") for side in sides]
+        for side, path in zip(sides, files):
             encode(images, frames, side, options, path)
         cameras = Cameras(port, files, 3)
-        slam = Slam(program, dataset, [stream.format(rtsp=port, left=port + 1, right=port + 2) for stream in streams], folder)
+        names = [stream.format(rtsp=port, left=port + 1, right=port + 2) for stream in streams]
+        slam = Slam(program, dataset, dict(zip(sides, names)), folder)
         try:
-            slam.wait_for("after left's, give or take")
+            for side in sides[1:]:
+                slam.wait_for(side + "'s images come")
             cameras.go()
             if cut:
                 time.sleep(frames / 3 / RATE)
@@ -184,6 +203,7 @@ def try_case(name, program, evaluate, dataset, frames, of_files):
                 cameras.go()
             check(cameras.process.stdout.readline() == "over\n", "all was sent")
             time.sleep(3)  # what a decoder holds
+            waited = slam.waited()
             slam.end()
         finally:
             cameras.stop()
@@ -196,7 +216,8 @@ def try_case(name, program, evaluate, dataset, frames, of_files):
     live, counts = summary["live"], summary["frames"]
     print("%s: %d sets, %d tracked, %d lost, %d dropped + %s before; %d of %d frames of the sequence, ATE %.4f cm (files: %.4f); grey levels off by %.2f" % (
         name, live["sets"], counts["tracked"], counts["lost"], counts["dropped"], live["dropped"], len(found), frames, ate, of_files, off))
-    print("    lost streams: %s" % live["lost"], flush=True)
+    print("    lost streams: %s; held up: %s; alone: %s; its threads waited %.1f s for a core" % (
+        live["lost"], live["held_up"], live["alone"], waited), flush=True)
     check(counts["lost"] == 0, "no frame is lost")
     check(counts["tracked"] == counts["read"] - counts["corrupt"], "what was not dropped is tracked")
     check(live["lost"]["left"] >= int(cut), "a stream that is cut is said to be lost")

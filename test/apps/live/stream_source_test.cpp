@@ -95,7 +95,7 @@ TEST_CASE("A stream that never delivers") {
   const auto source = rig.open();
   CHECK_THROWS_WITH(source->next({}),
                     "fake right: the right camera delivers nothing: no image in 0.5 s (fake: "
-                    "cannot be opened)");
+                    "cannot be opened); --timeout waits longer");
 }
 
 TEST_CASE("Images side by side are split") {

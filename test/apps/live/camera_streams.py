@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Sends two H.264 files, picture by picture at one clock, as two cameras that are triggered together: over RTSP and over TCP.
+"""Sends H.264 files, picture by picture at one clock, as cameras that are triggered together: over RTSP and over TCP.
 
-stereo_streams.py PORT RATE START LEFT RIGHT     at rtsp://127.0.0.1:PORT/left and /right, and as they are at the ports PORT+1 and PORT+2
+camera_streams.py PORT RATE START LEFT RIGHT [FISHEYE]     at rtsp://127.0.0.1:PORT/left, /right and /fisheye, and as they are at the
+ports PORT+1, PORT+2 and PORT+3
 
 The files: Annex B, with access unit delimiters, no B frames, three pictures to a group; the first group is the first picture,
 three times. It is sent again and again until a line comes on the standard input; then what comes from picture START on. At the end
@@ -22,6 +23,7 @@ gi.require_version("GstRtspServer", "1.0")
 from gi.repository import GLib, Gst, GstRtsp, GstRtspServer  # noqa: E402
 
 GROUP = 3
+SIDES = ("left", "right", "fisheye")
 LAUNCH = ("( appsrc name=source is-live=true format=time do-timestamp=true caps=video/x-h264,stream-format=byte-stream,alignment=au "
           "! h264parse config-interval=-1 ! rtph264pay name=pay0 pt=96 )")
 
@@ -34,7 +36,8 @@ def pictures_of(path):
 
 
 def main():
-    port, rate, start, files = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4:]
+    port, rate, start = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+    files = dict(zip(SIDES, sys.argv[4:]))
     Gst.init(None)
     server, sources, loop, go = GstRtspServer.RTSPServer(), {}, GLib.MainLoop(), threading.Event()
     server.set_service(port)
@@ -42,7 +45,7 @@ def main():
     def configured(_, media, side):
         sources[side] = media.get_element().get_by_name_recurse_up("source")
 
-    for side in ("left", "right"):
+    for side in files:
         factory = GstRtspServer.RTSPMediaFactory()
         factory.set_launch(LAUNCH)
         factory.set_shared(True)
@@ -50,7 +53,7 @@ def main():
         factory.connect("media-configure", configured, side)
         server.get_mount_points().add_factory("/" + side, factory)
     server.attach(None)
-    plain = {"left": [], "right": []}
+    plain: dict[str, list[socket.socket]] = {side: [] for side in files}
 
     def accept(side, listener):
         while True:
@@ -61,7 +64,7 @@ def main():
         threading.Thread(target=accept, args=(side, listener), daemon=True).start()
 
     def send():
-        streams = {side: pictures_of(path) for side, path in zip(("left", "right"), files)}
+        streams = {side: pictures_of(path) for side, path in files.items()}
         due, at = time.monotonic(), 0
         while at < len(streams["left"]):
             for side, source in list(sources.items()):
