@@ -52,6 +52,10 @@ std::shared_ptr<const NoiseFloor> floor_of(const ResidualMap& residuals);
 // The rows of the matches.
 void add_rows(const StereoFeatures& features, RowField& rows);
 
+// Median of the absolute differences of the matches' rows [px]; none without matches. The matcher
+// takes none that are a pixel or more apart: of larger errors there are hardly any matches.
+std::optional<double> row_error(const StereoFeatures& features);
+
 // Of the matches [px]; 0 without any.
 double median_disparity(const StereoFeatures& features);
 
