@@ -105,11 +105,22 @@ MapPicture make_picture(const SequenceInfo& sequence, const RunResult& result,
 }
 
 void write_frame_times(const std::filesystem::path& path, const std::vector<FrameRecord>& records) {
-  std::string text = "time,cpu_ms\n";
+  std::string text = "time,cpu_ms,behind_ms\n";
   for (const FrameRecord& record : records) {
-    text += fmt::format("{:.6f},{:.3f}\n", record.frame.time, record.cpu_ms);
+    text += fmt::format("{:.6f},{:.3f},{}\n", record.frame.time, record.cpu_ms,
+                        record.behind_ms ? fmt::format("{:.3f}", *record.behind_ms) : "");
   }
   write_file(path, text);
+}
+
+// Read from the files that are there already; empty if one of them was cut off.
+RunStory story_of(const std::filesystem::path& out, const MapSnapshot& map) {
+  try {
+    return read_story(out, &map);
+  } catch (const InputError& error) {
+    spdlog::warn("summary.json tells of no losses: {}", error.what());
+    return {};
+  }
 }
 
 FigureTables write_tables(const std::filesystem::path& out, const RunResult& result) {
@@ -125,6 +136,7 @@ FigureTables write_tables(const std::filesystem::path& out, const RunResult& res
   for (const std::string& reason : tables.calibration.reasons) {
     spdlog::warn("the rig should be calibrated again: {}", reason);
   }
+  tables.story = story_of(out, map);
   return tables;
 }
 
