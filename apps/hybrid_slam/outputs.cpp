@@ -141,7 +141,7 @@ FigureTables write_tables(const std::filesystem::path& out, const RunResult& res
 }
 
 // From the files that are there already. Nothing of the run depends on it: if one of them was cut
-// off by a full disk, say, there is a warning instead.
+// off by a full disk, say, or the page cannot be written, there is a warning instead.
 void write_report_of(const CommandLine& line, const ImageSequence* images, const RunResult& result,
                      const MapFigures& figures) {
   const std::filesystem::path page = std::filesystem::path(line.out) / "report.html";
@@ -157,6 +157,8 @@ void write_report_of(const CommandLine& line, const ImageSequence* images, const
   try {
     write_report(page, sources);
   } catch (const InputError& error) {
+    spdlog::warn("no report: {}", error.what());
+  } catch (const OutputError& error) {
     spdlog::warn("no report: {}", error.what());
   }
 }
