@@ -59,7 +59,7 @@ std::string header() {
          ",sigma_position,sigma_rotation_deg,covariance_base,reference" +
          pose_columns("reference_") +
          ",features,stereo_matches,inliers,odometer_inliers,keyframes,landmarks" +
-         covariance_columns() + ",component";
+         covariance_columns() + ",component,row_error_px";
 }
 
 // The frame's pose in the map, how far off it may be, and the motion from its reference keyframe,
@@ -85,7 +85,8 @@ std::string row(const FrameResult& frame) {
   text += fmt::format(",{},{},{},{},{},{}", frame.features, frame.stereo_matches, tracked.inliers,
                       tracked.odometer_inliers, frame.keyframes, frame.landmarks);
   return text + (frame.has_pose() ? values(figures.covariance) : commas(kCovarianceColumns)) +
-         id_of(frame.component);
+         id_of(frame.component) +
+         (frame.row_error ? fmt::format(",{:.4f}", *frame.row_error) : std::string(","));
 }
 
 }  // namespace
@@ -128,7 +129,7 @@ void FrameWriter::write_pose(Trajectory& files, const FrameResult& frame) {
 void FrameWriter::left_out(const LeftOut& input) {
   append(frames_, fmt::format("{},{:.9f},,{},,,", to_string(input.camera), to_seconds(input.time),
                               input.reason) +
-                      commas(kPoseColumns + 4 + kPoseColumns + 6 + kCovarianceColumns + 1));
+                      commas(kPoseColumns + 4 + kPoseColumns + 6 + kCovarianceColumns + 2));
 }
 
 }  // namespace hybrid_slam

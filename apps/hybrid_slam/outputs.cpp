@@ -105,11 +105,22 @@ MapPicture make_picture(const SequenceInfo& sequence, const RunResult& result,
 }
 
 void write_frame_times(const std::filesystem::path& path, const std::vector<FrameRecord>& records) {
-  std::string text = "time,cpu_ms\n";
+  std::string text = "time,cpu_ms,behind_ms\n";
   for (const FrameRecord& record : records) {
-    text += fmt::format("{:.6f},{:.3f}\n", record.frame.time, record.cpu_ms);
+    text += fmt::format("{:.6f},{:.3f},{}\n", record.frame.time, record.cpu_ms,
+                        record.behind_ms ? fmt::format("{:.3f}", *record.behind_ms) : "");
   }
   write_file(path, text);
+}
+
+// Read from the files that are there already; empty if one of them was cut off.
+RunStory story_of(const std::filesystem::path& out, const MapSnapshot& map) {
+  try {
+    return read_story(out, &map);
+  } catch (const InputError& error) {
+    spdlog::warn("summary.json tells of no losses: {}", error.what());
+    return {};
+  }
 }
 
 FigureTables write_tables(const std::filesystem::path& out, const RunResult& result) {
@@ -125,11 +136,12 @@ FigureTables write_tables(const std::filesystem::path& out, const RunResult& res
   for (const std::string& reason : tables.calibration.reasons) {
     spdlog::warn("the rig should be calibrated again: {}", reason);
   }
+  tables.story = story_of(out, map);
   return tables;
 }
 
 // From the files that are there already. Nothing of the run depends on it: if one of them was cut
-// off by a full disk, say, there is a warning instead.
+// off by a full disk, say, or the page cannot be written, there is a warning instead.
 void write_report_of(const CommandLine& line, const ImageSequence* images, const RunResult& result,
                      const MapFigures& figures) {
   const std::filesystem::path page = std::filesystem::path(line.out) / "report.html";
@@ -145,6 +157,8 @@ void write_report_of(const CommandLine& line, const ImageSequence* images, const
   try {
     write_report(page, sources);
   } catch (const InputError& error) {
+    spdlog::warn("no report: {}", error.what());
+  } catch (const OutputError& error) {
     spdlog::warn("no report: {}", error.what());
   }
 }

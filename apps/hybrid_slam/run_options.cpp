@@ -21,7 +21,7 @@ const char* const kWrittenFiles =
                      covariance, and what was wrong with it
   fisheye_in_left.csv  likewise: pose of the fisheye in the left camera, and covariance
   timing.json        milliseconds per stage: count, mean, p50, p95, p99, max
-  timing.csv         CPU time per stereo frame, of the whole process
+  timing.csv         CPU time per stereo frame, of the whole process; how far behind it was tracked
   loops.csv          places that were proposed as loops, and what came of them
   summary.json       frames, keyframes, landmarks, options, and ATE where the dataset has truth
   errors.csv         per frame, its distance from the truth, where the dataset has it

@@ -9,6 +9,7 @@
 #include "apps/hybrid_slam/provenance.h"
 #include "apps/io/ply.h"
 #include "apps/io/report.h"
+#include "apps/report/frame_data.h"
 #include "apps/slam/version.h"
 
 namespace hybrid_slam {
@@ -112,6 +113,7 @@ Json summary_json(const CommandLine& line, const RunInput& input, const RunResul
   json["internal_errors"] = result.internal_errors;
   json["seconds"] = summary.seconds;
   json["ate"] = summary.ate ? to_json(*summary.ate) : Json();
+  json.update(story_json(tables.story));
   json["truth_convention"] =
       sequence.truth_convention.empty() ? Json() : Json(sequence.truth_convention);
   json["upsampling"] = to_json(result.upsampling.value_or(UpsamplingEvidence()), result.upsampled);

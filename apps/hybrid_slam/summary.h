@@ -6,6 +6,7 @@
 #include "apps/hybrid_slam/outputs.h"
 #include "apps/report/coverage.h"
 #include "apps/report/map_figures.h"
+#include "apps/report/run_story.h"
 
 namespace hybrid_slam {
 
@@ -14,6 +15,7 @@ struct FigureTables {
   MapFigures figures;
   Coverage coverage;
   CalibrationFigures calibration;
+  RunStory story;  // of the folder's files; empty if they are not whole
 };
 
 // The content of summary.json.

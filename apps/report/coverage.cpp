@@ -17,6 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kOutside = 0.02;    // share of the landmarks beyond either end of either axis
+constexpr double kNearOrFar = 0.05;  // share of a keyframe's landmarks at either end
 constexpr int kCells = 160;          // along the longer side, at most
 constexpr std::size_t kFewest = 10;  // landmarks that tell a plane
 constexpr int kSubCell = 8;          // bits of a cell's fraction in OpenCV's drawing
@@ -87,9 +88,44 @@ double round_up(double length) {
   return 10 * power;
 }
 
-void lay_out(Coverage& coverage, const std::vector<Eigen::Vector3d>& points) {
-  const Range right = most_of(points, coverage.axes.row(0));
-  const Range up = most_of(points, coverage.axes.row(1));
+// The landmarks that a keyframe sees, without the nearest and the farthest.
+std::vector<Eigen::Vector3d> ground_of(const MapFigures& figures, const KeyframeFigures& keyframe) {
+  const auto distance = [&](std::uint32_t landmark) {
+    return (figures.landmarks[landmark].point - keyframe.world_from_cam.translation()).norm();
+  };
+  std::vector<double> distances;
+  for (const std::uint32_t landmark : keyframe.seen) distances.push_back(distance(landmark));
+  const double nearest = quantile(distances, kNearOrFar);
+  const double farthest = quantile(distances, 1 - kNearOrFar);
+  std::vector<Eigen::Vector3d> points;
+  for (const std::uint32_t landmark : keyframe.seen) {
+    const double away = distance(landmark);
+    if (away >= nearest && away <= farthest) points.push_back(figures.landmarks[landmark].point);
+  }
+  return points;
+}
+
+// From one end of the footprints to the other, but no farther beyond most of the landmarks than
+// half of what these cover: a keyframe may see little else than what is far off.
+Range ground_range(const MapFigures& figures, const std::vector<Eigen::Vector3d>& points,
+                   const Eigen::Vector3d& axis) {
+  Range range = most_of(points, axis);
+  const double margin = 0.5 * range.size();
+  const Range widest{range.low - margin, range.high + margin};
+  for (const KeyframeFigures& keyframe : figures.keyframes) {
+    for (const Eigen::Vector3d& point : ground_of(figures, keyframe)) {
+      const double at = std::clamp(axis.dot(point), widest.low, widest.high);
+      range.low = std::min(range.low, at);
+      range.high = std::max(range.high, at);
+    }
+  }
+  return range;
+}
+
+void lay_out(Coverage& coverage, const MapFigures& figures,
+             const std::vector<Eigen::Vector3d>& points) {
+  const Range right = ground_range(figures, points, coverage.axes.row(0));
+  const Range up = ground_range(figures, points, coverage.axes.row(1));
   const Range height = most_of(points, coverage.axes.row(2));
   coverage.cell = round_up(std::max({right.size(), up.size(), 1e-6}) / kCells);
   coverage.corner = {std::floor(right.low / coverage.cell) * coverage.cell,
@@ -111,18 +147,9 @@ Eigen::Vector2d in_cells(const Coverage& coverage, const Eigen::Vector3d& point)
 // Corners in cells, times 2^kSubCell, the middle of the first cell at 0.
 std::vector<cv::Point> footprint(const Coverage& coverage, const MapFigures& figures,
                                  const KeyframeFigures& keyframe) {
-  std::vector<double> distances;
-  for (const std::uint32_t at : keyframe.seen) {
-    distances.push_back(
-        (figures.landmarks[at].point - keyframe.world_from_cam.translation()).norm());
-  }
-  const double nearest = quantile(distances, 0.05), farthest = quantile(distances, 0.95);
   std::vector<cv::Point> points;
-  for (std::size_t i = 0; i < keyframe.seen.size(); ++i) {
-    if (distances[i] < nearest || distances[i] > farthest) continue;
-    const Eigen::Vector2d at =
-        (in_cells(coverage, figures.landmarks[keyframe.seen[i]].point).array() - 0.5) *
-        (1 << kSubCell);
+  for (const Eigen::Vector3d& point : ground_of(figures, keyframe)) {
+    const Eigen::Vector2d at = (in_cells(coverage, point).array() - 0.5) * (1 << kSubCell);
     const double limit = 1e8;  // OpenCV's drawing counts in int
     points.emplace_back(static_cast<int>(std::clamp(at.x(), -limit, limit)),
                         static_cast<int>(std::clamp(at.y(), -limit, limit)));
@@ -172,7 +199,7 @@ Coverage find_coverage(const MapFigures& figures) {
   const std::vector<Eigen::Vector3d> points = inner_points(figures);
   if (points.size() < kFewest) return coverage;
   coverage.axes = plane_axes(points, figures);
-  lay_out(coverage, points);
+  lay_out(coverage, figures, points);
   for (const KeyframeFigures& keyframe : figures.keyframes) {
     add_footprint(coverage, figures, keyframe);
   }

@@ -1,9 +1,14 @@
 #include "apps/report/frame_data.h"
 
+#include <cmath>
 #include <cstdint>
+#include <map>
+#include <numeric>
 #include <string>
 #include <utility>
 
+#include "apps/io/report.h"
+#include "apps/io/trajectory.h"
 #include "apps/report/page_arrays.h"
 
 namespace hybrid_slam {
@@ -11,7 +16,63 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+Json or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json losses_json(const RunStory& story) {
+  Json list = Json::array();
+  for (const LostStretch& loss : story.losses) {
+    const RunFrame& first = story.frames[loss.first];
+    list.push_back({{"camera", first.stereo ? "stereo" : "fisheye"},
+                    {"from", first.time},
+                    {"to", story.frames[loss.last].time},
+                    {"frames", loss.frames},
+                    {"cause", loss.cause}});
+  }
+  return list;
+}
+
+std::vector<double> known_of(const std::vector<RunFrame>& frames, double RunFrame::*figure) {
+  std::vector<double> values;
+  for (const RunFrame& frame : frames) {
+    if (std::isfinite(frame.*figure)) values.push_back(frame.*figure);
+  }
+  return values;
+}
+
+// Null without values.
+Json times_json(const std::vector<double>& ms) {
+  if (ms.empty()) return Json();
+  const double sum = std::accumulate(ms.begin(), ms.end(), 0.0);
+  return {{"mean", sum / static_cast<double>(ms.size())},
+          {"median", quantile(ms, 0.5)},
+          {"p95", quantile(ms, 0.95)},
+          {"max", quantile(ms, 1)}};
+}
+
+Json errors_by_state(const RunStory& story) {
+  std::map<std::pair<bool, std::string>, std::vector<double>> errors;  // stereo first
+  for (const RunFrame& frame : story.frames) {
+    if (std::isfinite(frame.error)) errors[{!frame.stereo, frame.state}].push_back(frame.error);
+  }
+  Json list = Json::array();
+  for (const auto& [of, values] : errors) {
+    list.push_back({{"camera", of.first ? "fisheye" : "stereo"},
+                    {"state", of.second},
+                    {"position_m", to_json(error_statistics(values))}});
+  }
+  return list;
+}
+
 }  // namespace
+
+Json story_json(const RunStory& story) {
+  return {{"span_s", story.span},
+          {"period_s", or_null(story.period)},
+          {"losses", losses_json(story)},
+          {"cpu_ms", times_json(known_of(story.frames, &RunFrame::cpu_ms))},
+          {"behind_ms", times_json(known_of(story.frames, &RunFrame::behind_ms))},
+          {"error_by_state", errors_by_state(story)}};
+}
 
 std::vector<std::size_t> frames_to_show(const std::vector<RunFrame>& frames) {
   const std::size_t step = (frames.size() + kPageFrames - 1) / kPageFrames;
@@ -30,7 +91,8 @@ Json frames_json(const RunStory& story) {
   NameNumbers states, sources, predictions;
   std::vector<double> times;
   std::vector<std::uint8_t> camera, state, source, prediction;
-  std::vector<float> features, matches, inliers, odometer, sigma, turn, cpu, error, component;
+  std::vector<float> features, matches, inliers, odometer, sigma, turn, cpu, behind, error,
+      component, rows;
   PoseArrays poses;
   Json causes = Json::object();
   const std::vector<std::size_t> shown = frames_to_show(story.frames);
@@ -50,8 +112,10 @@ Json frames_json(const RunStory& story) {
                                         {&sigma, frame.sigma_position},
                                         {&turn, frame.sigma_rotation},
                                         {&cpu, frame.cpu_ms},
+                                        {&behind, frame.behind_ms},
                                         {&error, frame.error},
-                                        {&component, frame.component}}) {
+                                        {&component, frame.component},
+                                        {&rows, frame.row_error}}) {
       column->push_back(static_cast<float>(value));
     }
   }
@@ -73,23 +137,12 @@ Json frames_json(const RunStory& story) {
           {"odometer_inliers", page_array(odometer)},
           {"sigma_position", page_array(sigma)},
           {"sigma_rotation_deg", page_array(turn)},
+          {"row_error_px", page_array(rows)},
           {"cpu_ms", page_array(cpu)},
+          {"behind_ms", page_array(behind)},
           {"error_m", page_array(error)},
           {"component", page_array(component)},
           {"causes", causes}};
-}
-
-Json losses_json(const RunStory& story) {
-  Json list = Json::array();
-  for (const LostStretch& loss : story.losses) {
-    const RunFrame& first = story.frames[loss.first];
-    list.push_back({{"camera", first.stereo ? "stereo" : "fisheye"},
-                    {"from", first.time},
-                    {"to", story.frames[loss.last].time},
-                    {"frames", loss.frames},
-                    {"cause", loss.cause}});
-  }
-  return list;
 }
 
 Json truth_json(const ResultTable& errors) {

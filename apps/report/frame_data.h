@@ -19,7 +19,10 @@ inline constexpr std::size_t kPageFrames = 9000;
 std::vector<std::size_t> frames_to_show(const std::vector<RunFrame>& frames);
 
 nlohmann::ordered_json frames_json(const RunStory& story);
-nlohmann::ordered_json losses_json(const RunStory& story);
+
+// What summary.json says of all frames together: span_s, period_s, losses, cpu_ms and behind_ms of
+// the stereo frames, error_by_state of each camera.
+nlohmann::ordered_json story_json(const RunStory& story);
 
 // errors.csv: the true path in the map's frame.
 nlohmann::ordered_json truth_json(const ResultTable& errors);

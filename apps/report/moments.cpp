@@ -24,7 +24,7 @@ struct Wish {
 std::vector<Wish> wishes(const RunStory& story, const ResultTable& loops) {
   std::vector<Wish> list;
   for (const LostStretch& loss : story.losses) {
-    list.push_back({story.frames[loss.first].time, "lost"});
+    list.push_back({story.frames[loss.first].time, "lost: " + loss.cause});
   }
   std::size_t accepted = 0;
   for (std::size_t i = 0; i < loops.size() && accepted < kLoops; ++i) {

@@ -40,6 +40,7 @@ ReportContent gather(const ReportSources& sources) {
     content.timing = read_json(sources.folder / "timing.json");
     content.loops = read_table(sources.folder / "loops.csv");
     content.errors = read_table(sources.folder / "errors.csv");
+    content.calibration = read_table(sources.folder / "calibration.csv");
     content.story = read_story(sources.folder, sources.map);
   }
   content.title = sources.title.empty() ? text_at(content.summary, "sequence") : sources.title;

@@ -15,7 +15,7 @@
 namespace hybrid_slam {
 
 // What a report is made of, beside the files of a folder of results (summary.json, frames.csv,
-// timing.json, timing.csv, loops.csv, errors.csv; each may be missing).
+// timing.json, timing.csv, loops.csv, errors.csv, calibration.csv; each may be missing).
 struct ReportSources {
   std::filesystem::path folder;             // empty: there is no folder, only a map
   const MapSnapshot* map = nullptr;         // null: there is no map

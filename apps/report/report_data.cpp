@@ -20,8 +20,23 @@ Json loops_json(const ResultTable& loops) {
   for (std::size_t i = 0; i < loops.size(); ++i) {
     Json entry = {{"outcome", std::string(loops.text(i, "outcome"))}};
     for (const char* column : {"time", "match_time", "matches", "inliers", "final_matches",
-                               "found_share", "off_m", "off_deg"}) {
+                               "found_share", "off_m", "off_deg", "joins"}) {
       const double value = loops.number(i, column);
+      entry[column] = std::isfinite(value) ? Json(value) : Json();
+    }
+    list.push_back(entry);
+  }
+  return list;
+}
+
+// calibration.csv: what is systematic, by place in the image.
+Json calibration_json(const ResultTable& cells) {
+  Json list = Json::array();
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    Json entry = {{"camera", std::string(cells.text(i, "camera"))}};
+    for (const char* column : {"column", "row", "count", "mean_row_px", "mean_disparity_px",
+                               "floor_px", "floor_disparity_px"}) {
+      const double value = cells.number(i, column);
       entry[column] = std::isfinite(value) ? Json(value) : Json();
     }
     list.push_back(entry);
@@ -52,8 +67,7 @@ std::string report_data(const ReportContent& content, std::size_t bytes) {
   data["verdict"] = verdict(content.summary, story, content.figures);
   data["summary"] = content.summary;
   data["timing"] = content.timing;
-  data["span_s"] = story.span;
-  data["period_s"] = std::isfinite(story.period) ? Json(story.period) : Json();
+  data.update(story_json(story));
   data["residuals"] = residuals_json(content.figures);
   data["landmark_sigma_mm"] = landmark_sigma_json(content.figures);
   data["coverage"] = to_json(content.coverage, content.figures);
@@ -61,8 +75,8 @@ std::string report_data(const ReportContent& content, std::size_t bytes) {
   data["map_options"] = content.map_options;
   data["cameras"] = cameras_json(content.cameras);
   data["frames"] = frames_json(story);
-  data["losses"] = losses_json(story);
   data["loops"] = loops_json(content.loops);
+  data["calibration_cells"] = calibration_json(content.calibration);
   data["truth"] = truth_json(content.errors);
   data["keyframes"] = keyframes_json(content.figures.keyframes, story);
   data["coverage_grid"] = coverage_grid_json(content.coverage);

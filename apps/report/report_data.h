@@ -19,6 +19,7 @@ struct ReportContent {
   RunStory story;
   ResultTable loops;
   ResultTable errors;
+  ResultTable calibration;
   MapFigures figures;
   Coverage coverage;
   std::vector<Camera> cameras;  // of the map

@@ -59,6 +59,7 @@ RunFrame frame_at(const ResultTable& table, std::size_t row, const MapSnapshot* 
   frame.inliers = table.number(row, "inliers");
   frame.odometer = table.number(row, "odometer_inliers");
   frame.component = table.number(row, "component");
+  frame.row_error = table.number(row, "row_error_px");
   constexpr std::array kColumns = {"cov_x_x", "cov_x_y", "cov_x_z",
                                    "cov_y_y", "cov_y_z", "cov_z_z"};
   for (std::size_t i = 0; i < kColumns.size(); ++i) {
@@ -79,7 +80,9 @@ void add_times_and_errors(const std::filesystem::path& folder, std::vector<RunFr
     const ResultTable times(folder / "timing.csv");
     for (std::size_t i = 0; i < times.size(); ++i) {
       RunFrame* const frame = find(true, times.number(i, "time"));
-      if (frame != nullptr) frame->cpu_ms = times.number(i, "cpu_ms");
+      if (frame == nullptr) continue;
+      frame->cpu_ms = times.number(i, "cpu_ms");
+      frame->behind_ms = times.number(i, "behind_ms");
     }
   }
   if (std::filesystem::exists(folder / "errors.csv")) {

@@ -24,8 +24,10 @@ struct RunFrame {
   double sigma_rotation = kUnknown;  // [degrees]
   double features = kUnknown, stereo_matches = kUnknown, inliers = kUnknown, odometer = kUnknown;
   double component = kUnknown;
-  double cpu_ms = kUnknown;  // timing.csv
-  double error = kUnknown;   // errors.csv [m]
+  double row_error = kUnknown;  // of the pair [px]
+  double cpu_ms = kUnknown;     // timing.csv
+  double behind_ms = kUnknown;  // likewise
+  double error = kUnknown;      // errors.csv [m]
   // Of the position along the axes of covariance_base [m^2]: xx xy xz yy yz zz.
   std::array<double, 6> covariance;
   std::optional<KeyframeId> covariance_base;

@@ -58,8 +58,9 @@ class Reasons {
     const double rmse = number_at(summary_, {"ate", "position_m", "rmse"});
     if (std::isfinite(rmse)) {
       add("accuracy",
-          fmt::format("{} RMSE from the truth over {:.4g} m of way (SE3 alignment)",
-                      millimetres(rmse), number_at(summary_, {"ate", "true_length_m"})));
+          fmt::format("{} RMSE from the truth over {:.4g} m of way (SE3 alignment){}",
+                      millimetres(rmse), number_at(summary_, {"ate", "true_length_m"}),
+                      count_at(summary_, "components") > 1 ? ", of the largest part alone" : ""));
       const double arm =
           number_at(summary_, {"fisheye", "relative_pose_error", "translation_m", "median"});
       if (std::isfinite(arm)) {
@@ -119,32 +120,69 @@ class Reasons {
   void add_calibration() {
     if (!summary_.contains("causes")) return;
     const int doubtful = count_at(summary_.at("causes"), "calibration_doubtful");
-    const double offset = number_at(summary_, {"disparity_offset_px"});
+    if (doubtful > 0) {
+      add("calibration", fmt::format("calibration doubtful in {} frames", doubtful), false);
+    }
+    const Json found = summary_.value("calibration", Json::object());
+    const Json wrong = found.value("reasons", Json::array());
+    for (const Json& reason : wrong) {
+      if (!reason.is_string()) continue;
+      add("calibration", "the rig should be calibrated again: " + reason.get<std::string>(), false);
+    }
+    if (doubtful > 0 || !wrong.empty()) return;
+    const double rows = number_at(found, {"rows_px"});
+    const double sigma = number_at(found, {"disparity_offset_sigma_px"});
     add("calibration",
-        doubtful > 0
-            ? fmt::format("calibration doubtful in {} frames; disparities off by {:.2f} px",
-                          doubtful, offset)
-            : fmt::format("calibration: no frame made it doubtful; disparities off by {:.2f} px",
-                          offset),
-        doubtful == 0);
+        fmt::format(
+            "calibration: nothing speaks against it{}; disparities off by {:.2f} px{}",
+            std::isfinite(rows) ? fmt::format("; rows off by {:.2f} px by place", rows) : "",
+            number_at(summary_, {"disparity_offset_px"}),
+            std::isfinite(sigma) ? fmt::format(", 1 sigma {:.2f} px", sigma) : ""),
+        true);
   }
 
   void add_ground() {
     const double once = number_at(summary_, {"coverage", "seen_once_share"});
     if (!std::isfinite(once)) return;
-    add("ground", fmt::format("{:.0f} % of the ground that was seen was seen by one keyframe only",
-                              100 * once));
+    const double sigma = number_at(summary_, {"landmark_sigma_mm", "median"});
+    const double weak = number_at(summary_, {"landmark_sigma_mm", "p95"});
+    add("ground",
+        fmt::format("{:.1f} % of the ground that was seen was seen by one keyframe only{}",
+                    100 * once,
+                    std::isfinite(sigma)
+                        ? fmt::format("; landmarks are uncertain by {:.3g} mm (median), one in "
+                                      "twenty by more than {:.3g} mm",
+                                      sigma, weak)
+                        : ""));
   }
 
   void add_time() {
     const double seconds = number_at(summary_, {"seconds"});
     if (!(seconds > 0) || !(story_.span > 0)) return;
     const int dropped = count_at(summary_.value("frames", Json::object()), "dropped");
+    const Json options = summary_.value("options", Json::object());
+    if (options.value("mode", "") == "realtime") return add_realtime(options, dropped);
     add("time",
         fmt::format("{:.4g} s for {:.4g} s of images: {}{}", seconds, story_.span,
                     seconds <= story_.span ? "faster than the cameras" : "slower than the cameras",
                     dropped > 0 ? fmt::format("; {} frames dropped", dropped) : ""),
         seconds <= story_.span && dropped == 0);
+  }
+
+  // Images come by the clock then, and what is too much for the machine is dropped.
+  void add_realtime(const Json& options, int dropped) {
+    const double rate = number_at(options, {"rate"});
+    const double behind = number_at(summary_, {"behind_ms", "p95"});
+    std::string text = "realtime";
+    if (rate > 0) text += fmt::format(" at {:.3g} Hz", rate);
+    if (rate > 0 && std::isfinite(story_.period)) {
+      text += fmt::format(", the images are of {:.3g} Hz", 1 / story_.period);
+    }
+    text += fmt::format(": {} frames dropped", dropped);
+    if (std::isfinite(behind)) {
+      text += fmt::format("; 95 % of the poses came within {:.0f} ms", behind);
+    }
+    add("time", text, dropped == 0);
   }
 
   const Json& summary_;

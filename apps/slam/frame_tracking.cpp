@@ -108,6 +108,7 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
   result.landmarks = map.landmark_count();
   result.mapping_behind = !allow_keyframe;
   result.causes = diagnosis_.look(frame);
+  result.row_error = row_error(frame.frame.features);
   learn_calibration(frame);
   follow_calibration(frame, map);
   TrackedFrame tracked = track_by_camera(frame, map, allow_keyframe && !localize_);

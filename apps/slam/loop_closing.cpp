@@ -32,6 +32,7 @@ std::optional<LoopMeasurement> LoopClosing::find(const MapSnapshot& map, Keyfram
     record.match = proposal.match;
     record.time = time_of(map, proposal.keyframe);
     record.match_time = time_of(map, proposal.match);
+    record.joins = map.component(proposal.keyframe) != map.component(proposal.match);
     loop = std::exchange(proposal.verification.loop, std::nullopt);
     record.outcome = loop ? "not closed" : to_string(proposal.verification.reason);
     record.verification = std::move(proposal.verification);

@@ -22,6 +22,7 @@ struct LoopRecord {
   LoopVerification verification;  // without the loop
   double translation = 0;         // by which the map was off [m], if that was looked at
   double rotation = 0;            // [rad]
+  bool joins = false;             // its ends lie in two components of the map, which it would join
 };
 
 inline constexpr const char* kLoopAccepted = "accepted";

@@ -2,6 +2,8 @@
 
 #include <time.h>
 
+#include <iterator>
+
 namespace hybrid_slam {
 namespace {
 
@@ -35,6 +37,11 @@ Rigid3d RunResult::cam_from_world(const FrameRecord& record) const {
 Recorder::Recorder(RunResult& result, const ReplayHooks& hooks, std::size_t total)
     : result_(result), hooks_(hooks), cpu_ms_(process_cpu_ms()) {
   progress_.total = total;
+}
+
+void Recorder::due(Nanoseconds time, std::chrono::steady_clock::time_point moment) {
+  const std::lock_guard lock(mutex_);
+  due_[time] = moment;
 }
 
 void Recorder::corrupt(Nanoseconds time, const std::string& reason) {
@@ -97,6 +104,7 @@ void Recorder::tracked(const FrameResult& frame) {
   progress_.landmarks = frame.landmarks;
   if (!stereo) return;
   add_cpu_time();
+  add_time_behind(frame.time);
   report();
 }
 
@@ -117,6 +125,16 @@ void Recorder::add_cpu_time() {
   const double now = process_cpu_ms();
   result_.records.back().cpu_ms += now - cpu_ms_;
   cpu_ms_ = now;
+}
+
+// Those before it were left out.
+void Recorder::add_time_behind(Nanoseconds time) {
+  const auto found = due_.find(time);
+  if (found == due_.end()) return;
+  const std::chrono::duration<double, std::milli> behind =
+      std::chrono::steady_clock::now() - found->second;
+  result_.records.back().behind_ms = behind.count();
+  due_.erase(due_.begin(), std::next(found));
 }
 
 void Recorder::finish(const SessionCounts& counts, bool cancelled) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <mutex>
@@ -14,6 +15,9 @@ class Recorder {
  public:
   Recorder(RunResult& result, const ReplayHooks& hooks, std::size_t total);
 
+  // The stereo pair of `time` is due, as a camera gives it: how far behind it is tracked is counted
+  // from here.
+  void due(Nanoseconds time, std::chrono::steady_clock::time_point moment);
   void corrupt(Nanoseconds time, const std::string& reason);
   void fisheye_missing(Nanoseconds time, const std::string& reason);
   void dropped_unread(Nanoseconds time);
@@ -28,12 +32,14 @@ class Recorder {
   void warn(const std::string& text);
   void report();
   void add_cpu_time();
+  void add_time_behind(Nanoseconds time);
   void tell_left_out(const LeftOut& input);
 
   RunResult& result_;
   const ReplayHooks& hooks_;
   ReplayProgress progress_;
   double cpu_ms_;  // that the process had used when the last frame was done
+  std::map<Nanoseconds, std::chrono::steady_clock::time_point> due_;  // of pairs not yet tracked
   std::map<std::pair<CameraKind, std::int64_t>, std::size_t> record_of_frame_;
   std::mutex mutex_;  // guards all of it
 };

@@ -41,6 +41,7 @@ void push_all(const FrameSource& source, std::size_t total, double rate, const R
     if (!moment.fisheye_error.empty())
       recorder.fisheye_missing(source.time(i), moment.fisheye_error);
     if (hooks.images) hooks.images(moment);
+    if (rate > 0) recorder.due(source.time(i), due);
     for (SensorInput& input : moment.inputs) {
       if (session.push(std::move(input)) == PushResult::kClosed) return;
     }

@@ -96,6 +96,9 @@ struct FrameRecord {
   // Of a stereo frame: of the whole process, all its threads, from when the stereo frame before was
   // tracked [ms]. The first one's has the start of the run, the last one's the end.
   double cpu_ms = 0;
+  // Of a stereo frame, where somebody's clock gives the images (realtime at a rate, cameras): how
+  // long after they were due it was tracked [ms]. None otherwise.
+  std::optional<double> behind_ms{};
   bool in_main = true;  // it has a pose in the component that holds most of the frames at the end
 };
 

@@ -77,7 +77,9 @@ struct FrameResult {
   std::optional<UncertainMotion> left_from_fisheye;
   std::vector<FoundCause> causes;  // what may be wrong, whether it was tracked or not
   int features = 0;
-  int stereo_matches = 0;     // of them; 0 for a fisheye
+  int stereo_matches = 0;  // of them; 0 for a fisheye
+  // Median of the absolute differences of the matches' rows [px]; none without matches.
+  std::optional<double> row_error;
   std::size_t keyframes = 0;  // in the map that it was tracked in
   std::size_t landmarks = 0;
   // Of the map, that it has a pose in; invalid without one, and of the frame that begins one.

@@ -41,6 +41,7 @@ LiveFrame live_frame(const FrameResult& frame) {
   line.inliers = frame.tracked.inliers;
   line.odometer = frame.tracked.odometer_inliers;
   if (frame.component.valid()) line.component = frame.component.value;
+  line.row_error = frame.row_error.value_or(kUnknown);
   line.covariance.fill(kUnknown);
   live.keyframes = static_cast<double>(frame.keyframes);
   live.landmarks = static_cast<double>(frame.landmarks);
@@ -72,6 +73,7 @@ Json frame_json(const LiveFrame& live) {
                {"sigma_position", or_null(frame.sigma_position)},
                {"sigma_rotation_deg", or_null(frame.sigma_rotation)},
                {"component", or_null(frame.component)},
+               {"row_error_px", or_null(frame.row_error)},
                {"keyframes", or_null(live.keyframes)},
                {"landmarks", or_null(live.landmarks)}};
   if (frame.world_from_cam) {

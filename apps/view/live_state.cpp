@@ -40,9 +40,7 @@ Json LiveState::json(const MapSnapshot* map, const LiveSteps& steps, std::size_t
   json["title"] = title_;
   json["frames"] = frames_json(story);
   json["frames"]["of"] = frames_.size() + forgotten_;
-  json["losses"] = losses_json(story);
-  json["span_s"] = story.span;
-  json["period_s"] = std::isfinite(story.period) ? Json(story.period) : Json();
+  json.update(story_json(story));
   json["loops"] = Json::array();
   for (const LoopRecord& loop : loops_) json["loops"].push_back(loop_json(loop));
   json["missed"] = missed;
@@ -53,7 +51,8 @@ Json loop_json(const LoopRecord& loop) {
   constexpr double kDegreesPerRad = 180 / std::numbers::pi;
   return {{"outcome", loop.outcome},       {"time", loop.time},
           {"match_time", loop.match_time}, {"final_matches", loop.verification.final_matches},
-          {"off_m", loop.translation},     {"off_deg", kDegreesPerRad * loop.rotation}};
+          {"off_m", loop.translation},     {"off_deg", kDegreesPerRad * loop.rotation},
+          {"joins", loop.joins ? 1 : 0}};
 }
 
 }  // namespace hybrid_slam

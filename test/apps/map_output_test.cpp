@@ -97,6 +97,19 @@ TEST_CASE("a checkpoint that cannot be written is a warning, the map at the end 
   }
 }
 
+TEST_CASE("a report that cannot be written costs a run nothing else") {
+  const TempFolder folder;
+  write_kitti_survey(folder.path() / "data");
+  fs::create_directories(folder.path() / "out/report.html/below");
+  const Outcome outcome = run_slam(folder.path(), "data", {"--quiet"});
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  CHECK(count_lines(outcome.err, "warning: no report: ") == 1);
+  CHECK(count_lines(outcome.err, "report.html") == 1);
+  CHECK(fs::exists(folder.path() / "out/map.hslam"));
+  CHECK(fs::exists(folder.path() / "out/summary.json"));
+}
+
 TEST_CASE("a full disk ends in one line and code 3") {
   const TempFolder folder;
   write_kitti_survey(folder.path() / "data");

@@ -1,5 +1,7 @@
 // A vehicle that is lost and sees no place that it knows maps on in another component, which is
 // joined with the first one when it comes back.
+#include <algorithm>
+
 #include <catch2/catch.hpp>
 
 #include "backend/map/components.h"
@@ -57,6 +59,12 @@ double worst_error(const RunResult& result, const SimulatedSource& source, std::
   return worst;
 }
 
+long joining_loops(const RunResult& result) {
+  return std::count_if(result.loops.begin(), result.loops.end(), [](const LoopRecord& loop) {
+    return loop.joins && loop.outcome == kLoopAccepted;
+  });
+}
+
 }  // namespace
 
 TEST_CASE("Lost in unknown ground, the map goes on in another component", "[integration]") {
@@ -68,6 +76,7 @@ TEST_CASE("Lost in unknown ground, the map goes on in another component", "[inte
     CHECK(late >= 0);
     CHECK(late <= (realtime ? 2 : 0));
     CHECK(result.components == 2);
+    CHECK(joining_loops(result) == 0);
     CHECK(result.frames.tracked == 20);
     CHECK(result.frames.other_components == 15 - late);
     CHECK(result.records[20 + kDark + static_cast<std::size_t>(late)].frame.source ==
@@ -86,6 +95,7 @@ TEST_CASE("Components are joined when the vehicle comes back", "[integration]") 
       INFO("seed " << seed << (realtime ? ", realtime" : ", every frame"));
       const RunResult result = run(source, realtime);
       CHECK(result.components == 1);
+      CHECK(joining_loops(result) == 1);
       const int late = result.frames.lost + result.frames.coasted - static_cast<int>(kDark);
       CHECK(late >= 0);
       CHECK(late <= (realtime ? 2 : 0));

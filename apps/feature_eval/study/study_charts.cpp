@@ -98,6 +98,33 @@ std::string html_text(const std::string& text) {
   return safe;
 }
 
+namespace {
+
+// Where names stand beside their marks: below one another where marks are close together.
+class Labels {
+ public:
+  // The height of the next one's text.
+  double place(double x, double y) {
+    constexpr double kWide = 75, kHigh = 12;
+    double at = y - 3;
+    for (bool moved = true; moved;) {
+      moved = false;
+      for (const auto& [other_x, other_at] : taken_) {
+        if (std::abs(other_x - x) >= kWide || std::abs(other_at - at) >= kHigh) continue;
+        at = other_at + kHigh;
+        moved = true;
+      }
+    }
+    taken_.emplace_back(x, at);
+    return at;
+  }
+
+ private:
+  std::vector<std::pair<double, double>> taken_;
+};
+
+}  // namespace
+
 std::string line_style(std::size_t method) {
   return fmt::format(R"(class="m m{}" stroke-dasharray="{}")", method % kColours,
                      kDashes[method % kDashes.size()]);
@@ -143,6 +170,7 @@ std::string speed_chart(const Study& study) {
                   std::log(kMost / kLeast));
   };
   std::string svg = begin_chart("AUC of the translation against the time of a pair");
+  Labels labels;
   for (double time = kLeast; time <= kMost; time *= 10) {
     add_line(svg, time_across(time), up(0), time_across(time), up(1));
     add_text(svg, time_across(time), up(0) + 15, "middle", fmt::format("{:.0f}", time));
@@ -155,7 +183,8 @@ std::string speed_chart(const Study& study) {
         std::back_inserter(svg),
         R"(<circle {} cx="{:.1f}" cy="{:.1f}" r="4"><title>{}: {:.1f} ms, {:.3f}</title></circle>)",
         line_style(i), time_across(milliseconds), up(auc), html_text(name), milliseconds, auc);
-    add_text(svg, time_across(milliseconds) + 7, up(auc) + (i % 2 == 0 ? -3 : 11), "start", name);
+    add_text(svg, time_across(milliseconds) + 7, labels.place(time_across(milliseconds), up(auc)),
+             "start", name);
   }
   return svg + "</svg>\n";
 }

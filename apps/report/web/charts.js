@@ -144,7 +144,7 @@ function lineChart(title, unit, series, limit) {
           'h3', {}, title + (unit ? ' [' + unit + ']' : ''), ' ',
           make(
               'small', {}, legend,
-              beyond ? `${beyond} values are beyond the chart, at most ${
+              beyond ? ` ${beyond === 1 ? 'one value is' : beyond + ' values are'} beyond the chart, at most ${
                            withUnit(Math.max(...all), unit)}` :
                        '')),
       svg);

@@ -60,6 +60,7 @@ function unitOf(key) {
   if (/_mm\.|_mm$/.test(key)) return 'mm';
   if (/translation_m\.|position_m\.|_m$/.test(key) && !/count$/.test(key)) return 'm';
   if (/_m2$/.test(key)) return 'm²';
+  if (/_ms\./.test(key)) return 'ms';
   if (/_mm_per_px$/.test(key)) return 'mm/px';
   if (/_px$/.test(key)) return 'px';
   if (/_sigmas$/.test(key)) return 'standard deviations';

@@ -1,5 +1,80 @@
 // (d) Coverage.
 
+// Where a point lies in the grid, in cells from its upper left corner.
+function placeInGrid(point) {
+  const grid = data.coverage_grid,
+        along = axis => axis[0] * point[0] + axis[1] * point[1] + axis[2] * point[2];
+  return [
+    (along(grid.axes[0]) - grid.corner_m[0]) / grid.cell_m,
+    grid.rows - (along(grid.axes[1]) - grid.corner_m[1]) / grid.cell_m
+  ];
+}
+
+// The stereo pair's way over the ground, a line per stretch with poses.
+function pathInGrid() {
+  const stretches = [];
+  let open = false;
+  for (let i = 0; i < frames.count; ++i) {
+    if (frames.camera[i] !== 0) continue;
+    if (hasPose(i) && !open) stretches.push([]);
+    open = hasPose(i);
+    if (open) stretches[stretches.length - 1].push(placeInGrid(positionOf(frames, i)));
+  }
+  return stretches.map(
+      points => make('polyline', {
+        class: 'way',
+        points: points.map(([x, y]) => x.toFixed(2) + ',' + y.toFixed(2)).join(' ')
+      }));
+}
+
+// The nearest stereo frame to a place in the grid, seen from above.
+function frameAbove(x, y) {
+  let best = -1, distance = Infinity;
+  for (let i = 0; i < frames.count; ++i) {
+    if (frames.camera[i] !== 0 || !hasPose(i)) continue;
+    const [u, v] = placeInGrid(positionOf(frames, i)), off = Math.hypot(u - x, v - y);
+    if (off < distance) [best, distance] = [i, off];
+  }
+  return best;
+}
+
+// A picture of the grid, with the way over it; `readout` says what is under the pointer, a click
+// chooses the frame above it.
+function gridPanel(values, low, high, text, readout) {
+  const grid = data.coverage_grid;
+  const svg = make(
+      'svg', {
+        viewBox: `0 0 ${grid.columns} ${grid.rows}`,
+        'aria-hidden': 'true',
+      },
+      pathInGrid());
+  const cell = event => {
+    const box = svg.getBoundingClientRect(),
+          scale = Math.min(box.width / grid.columns, box.height / grid.rows);
+    return [
+      (event.clientX - box.left - (box.width - scale * grid.columns) / 2) / scale,
+      (event.clientY - box.top - (box.height - scale * grid.rows) / 2) / scale
+    ];
+  };
+  svg.addEventListener('pointermove', event => readout(...cell(event)));
+  svg.addEventListener('click', event => selection.set(frameAbove(...cell(event))));
+  return make('div', {class: 'grid-box'}, gridCanvas(values, low, high, text), svg);
+}
+
+// What the files say of the cell at a place, in one line.
+function cellText(x, y) {
+  const grid = data.coverage_grid, column = Math.floor(x), row = grid.rows - 1 - Math.floor(y),
+        i = row * grid.columns + column;
+  const inside = column >= 0 && column < grid.columns && row >= 0 && row < grid.rows;
+  const place = `${length(grid.corner_m[0] + (column + 0.5) * grid.cell_m)} right, ${
+      length(grid.corner_m[1] + (row + 0.5) * grid.cell_m)} up`;
+  if (!inside || grid.stereo_views[i] + grid.fisheye_views[i] === 0) return `${place}: not seen`;
+  return `${place}: seen by ${grid.stereo_views[i]} stereo and ${
+             grid.fisheye_views[i]} fisheye keyframes, ` +
+      `${withUnit(grid.resolution_mm_per_px[i], 'mm/px')}, landmarks ` +
+      (known(grid.sigma_mm[i]) ? `uncertain by ${withUnit(grid.sigma_mm[i], 'mm')}` : 'none');
+}
+
 function gridCanvas(values, low, high, text) {
   const
       grid = data.coverage_grid,
@@ -26,8 +101,13 @@ function coverageSection() {
   const figures = data.coverage, all = [...Array(grid.columns * grid.rows).keys()].filter(seen);
   const size = `${length(grid.columns * grid.cell_m)} by ${
       length(grid.rows * grid.cell_m)}, cells of ${length(grid.cell_m)}`;
+  const under = make(
+      'p', {class: 'soft', 'aria-live': 'polite', id: 'under'},
+      'Point at a place of these pictures: its figures are shown here. A click chooses the frame above it.');
+  const readout = (x, y) => under.textContent = cellText(x, y);
   const panel = (title, unit, value, low, high, more = '') => make(
-      'div', {}, make('h3', {}, title), gridCanvas(i => seen(i) ? value(i) : NaN, low, high, title),
+      'div', {}, make('h3', {}, title),
+      gridPanel(i => seen(i) ? value(i) : NaN, low, high, title, readout),
       make('p', {class: 'soft'}, rampLegend(withUnit(low, unit), withUnit(high, unit) + more)));
   const resolution = i => grid.resolution_mm_per_px[i], sigma = i => grid.sigma_mm[i];
   const panels = [panel(
@@ -36,8 +116,9 @@ function coverageSection() {
   if (grid.fisheye_views.some(views => views > 0))
     panels.push(make(
         'div', {}, make('h3', {}, 'By the fisheye'),
-        gridCanvas(
-            i => grid.fisheye_views[i] > 0 ? grid.fisheye_views[i] : NaN, 1, 9, 'By the fisheye'),
+        gridPanel(
+            i => grid.fisheye_views[i] > 0 ? grid.fisheye_views[i] : NaN, 1, 9, 'By the fisheye',
+            readout),
         make('p', {class: 'soft'}, rampLegend('1', '9 keyframes or more'))));
   panels.push(panel(
       'Ground resolution, the finest', 'mm/px', resolution, quantile(all.map(resolution), 0.02),
@@ -74,7 +155,8 @@ function coverageSection() {
       make(
           'p', {class: 'soft'},
           `Seen along the normal of the plane in which the landmarks spread most: ${
-              size}. A keyframe's footprint is the hull of the landmarks that it sees. Blank: not seen.`),
+              size}, right and up as in the picture from above. A keyframe's footprint is the hull of the landmarks that it sees. Blank: not seen. Line: the way of the stereo pair. Weak is what few keyframes saw, what is blank between them, and where landmarks are uncertain.`),
+      under,
       make('div', {class: 'pair'}, panels),
       make(
           'div', {class: 'pair'},
@@ -133,6 +215,52 @@ function residualGrid(grid) {
               withUnit(longest, 'px')}.`));
 }
 
+// calibration.csv: what of the residuals is systematic, by place in the image.
+function floorPanels() {
+  const panels = [
+    ['stereo', 'floor_px', 'noise floor (systematic part of the residuals)'],
+    ['stereo', 'floor_disparity_px', 'noise floor of the disparities'],
+    ['stereo', 'mean_row_px', 'rows, left less right, mean'],
+    ['fisheye', 'floor_px', 'noise floor (systematic part of the residuals)']
+  ];
+  return panels.map(([camera, key, title]) => {
+    const cells = data.calibration_cells.filter(cell => cell.camera === camera && known(cell[key]));
+    return cells.length ? cellPanel(cells, key, `${camera}: ${title}`) : null;
+  });
+}
+
+function cellPanel(cells, key, title) {
+  const columns = Math.max(...cells.map(cell => cell.column)) + 1,
+        rows = Math.max(...cells.map(cell => cell.row)) + 1, side = 57;
+  const high = Math.max(1e-3, ...cells.map(cell => Math.abs(cell[key])));
+  const svg = make(
+      'svg', {
+        viewBox: `0 0 ${columns * side} ${rows * side}`,
+        role: 'img',
+        'aria-label': title,
+        style: 'max-width:34rem'
+      },
+      cells.map(cell => [
+        make('rect', {
+          x: cell.column * side,
+          y: cell.row * side,
+          width: side,
+          height: side,
+          fill: rgb(ramp(Math.abs(cell[key]) / high)),
+          'fill-opacity': 0.55
+        },
+             make('title', {}, `${withUnit(cell[key], 'px')}, ${cell.count} observations`)),
+        make('text', {
+          class: 'label',
+          x: (cell.column + 0.5) * side,
+          y: (cell.row + 0.5) * side + 4,
+          'text-anchor': 'middle'
+        },
+             cell[key].toFixed(3))
+      ]));
+  return make('div', {}, make('h3', {}, title + ' [px]'), svg);
+}
+
 const PARAMETERS = {
   rectified_stereo: ['fx [px]', 'fy [px]', 'cx [px]', 'cy [px]', 'baseline [m]'],
   pinhole: ['fx [px]', 'fy [px]', 'cx [px]', 'cy [px]'],
@@ -148,14 +276,44 @@ function calibrationSection() {
                             withUnit(r.rms_right_px, 'px'), withUnit(r.assumed_sigma_px, 'px'),
                             number(r.rms_sigmas), number(r.median_sigmas)]);
   const summary = data.summary || {};
+  const found = summary.calibration || {}, out = found.taken_out;
   return make(
       'section', {}, tiles([
-        ['disparities off by', withUnit(summary.disparity_offset_px, 'px'), 'disparity_offset_px'],
+        [
+          'should the rig be calibrated again?',
+          found.doubtful === undefined ? '–' :
+              found.doubtful           ? 'yes' :
+                                         'nothing says so',
+          'calibration.doubtful'
+        ],
+        [
+          'disparities off by, and 1 sigma of it',
+          known(found.disparity_offset_sigma_px) ?
+              `${number(summary.disparity_offset_px)} ± ${
+                  withUnit(found.disparity_offset_sigma_px, 'px')}` :
+              withUnit(summary.disparity_offset_px, 'px'),
+          'disparity_offset_px'
+        ],
+        [
+          'rows off by, by place in the image', withUnit(found.rows_px, 'px'), 'calibration.rows_px'
+        ],
         [
           'frames with a doubtful calibration',
           summary.causes ? String(summary.causes.calibration_doubtful || 0) : '–'
         ]
       ]),
+      (found.reasons || []).map(reason => make('p', {}, '! ' + reason)),
+      out ? table(
+                ['taken out of the right images', ''],
+                [
+                  ['turned about x', withUnit(out.pitch_deg, '°')],
+                  ['turned about z', withUnit(out.roll_deg, '°')],
+                  ['focal length, right / left', number(out.focal_ratio, 6)],
+                  ['which moves rows by, RMS', withUnit(out.rows_px, 'px')],
+                  ['1 sigma of the row of a match', withUnit(out.row_sigma_px, 'px')]
+                ],
+                [1]) :
+            '',
       table(
           [
             'camera', 'observations', 'RMS, left u and v', 'RMS, right u', 'assumed, median',
@@ -164,8 +322,9 @@ function calibrationSection() {
           rows, [1, 2, 3, 4, 5, 6]),
       make(
           'p', {class: 'soft'},
-          'The noise floor is what is assumed of a keypoint; the ratio is 1 where measurements are as good as that, a little less since the map was fitted to them. A pattern in the lines means that the camera model does not hold there.'),
-      make('div', {class: 'pair'}, grids.map(residualGrid)), make('h3', {}, 'Calibration'),
+          'Assumed: the standard deviation of a keypoint, and the noise floor below with it, where the run used that. The ratio is 1 where measurements are as good as that, a little less since the map was fitted to them. A pattern in the lines means that the camera model does not hold there.'),
+      make('div', {class: 'pair'}, grids.map(residualGrid)),
+      make('div', {class: 'pair'}, floorPanels()), make('h3', {}, 'Calibration'),
       ...data.cameras.map(
           camera => make(
               'p', {},
@@ -177,5 +336,5 @@ function calibrationSection() {
                       .join(', '))),
       make(
           'p', {class: 'soft'},
-          'A run takes the calibration for exact: it is not refined, so there is no sigma of it. What it would be wrong by shows above.'));
+          'A run takes these numbers for exact, so they have no sigma. What it finds of them by itself, with its sigma, is above; docs/calibration.md says how, and what no run can see.'));
 }

@@ -14,7 +14,9 @@ const FRAME_COLUMNS = {
   odometer_inliers: 1,
   sigma_position: 1,
   sigma_rotation_deg: 1,
+  row_error_px: 1,
   cpu_ms: 1,
+  behind_ms: 1,
   error_m: 1,
   component: 1
 };

@@ -250,6 +250,7 @@ function showDetail(detail, i) {
     ['predicted by', frames.predictions[frames.prediction[i]] || '–'],
     ['features', number(frames.features[i], 6)],
     ['stereo matches', frames.camera[i] ? '–' : number(frames.stereo_matches[i], 6)],
+    ['rows apart by', withUnit(frames.row_error_px[i], 'px')],
     ['inliers', number(frames.inliers[i], 6)],
     ['odometer inliers', number(frames.odometer_inliers[i], 6)],
     [
@@ -264,12 +265,13 @@ function showDetail(detail, i) {
     ],
     ['from the truth', length(frames.error_m[i])],
     ['CPU time', withUnit(frames.cpu_ms[i], 'ms', 4)],
+    ['behind by', withUnit(frames.behind_ms[i], 'ms', 4)],
     ['component', number(frames.component[i], 9)],
   ].filter(row => row[1] !== '–');
   const pictures = picturesAt(frames.time[i]);
   detail.replaceChildren(
       make('dl', {}, rows.map(([name, value]) => [make('dt', {}, name), make('dd', {}, value)])),
-      ...pictures.map(pictureFigure),
+      make('div', {class: 'detail-pictures'}, pictures.map(pictureFigure)),
       pictures.length || data.live || data.served ?
           '' :
           make('p', {class: 'soft'}, 'No image of this frame in the report.'));

@@ -19,14 +19,18 @@ function loopsSection() {
           ['outcome', 'places'], [...outcomes].map(([name, count]) => [name, String(count)]), [1]),
       accepted.length ?
           table(
-              ['closed at', 'seen before at', 'matches', 'map was off by', 'and turned by'],
+              [
+                'closed at', 'seen before at', 'matches', 'map was off by', 'and turned by',
+                'joined parts'
+              ],
               accepted.map(
                   loop =>
                       [make(
                            'a', {href: '#map', click: () => selection.set(frameNear(loop.time, 0))},
                            seconds(loop.time)),
                        seconds(loop.match_time), number(loop.final_matches, 6), length(loop.off_m),
-                       withUnit(loop.off_deg, '°')]),
+                       withUnit(loop.off_deg, '°'),
+                       loop.joins ? 'yes: two components became one' : 'no']),
               [2, 3, 4]) :
           '',
       make('div', {class: 'pair'}, pairs.map(pair => make('div', {class: 'pictures'}, pair))));
@@ -44,20 +48,9 @@ function truthSection() {
             'The dataset has no truth: how far off the poses are is not known. Their own estimate of it is in the timeline.'));
   const p = ate.position_m, arm = at(data.summary, 'fisheye.relative_pose_error');
   const cameras = [0, 1].filter(camera => frames.camera.includes(camera));
-  const rows = [];
-  for (const camera of cameras)
-    for (const state of frames.states) {
-      const errors = [];
-      for (let i = 0; i < frames.count; ++i)
-        if (frames.camera[i] === camera && stateOf(i) === state && known(frames.error_m[i]))
-          errors.push(frames.error_m[i]);
-      if (errors.length)
-        rows.push([
-          CAMERAS[camera], state, String(errors.length),
-          length(Math.sqrt(errors.reduce((sum, e) => sum + e * e, 0) / errors.length)),
-          length(quantile(errors, 0.5)), length(Math.max(...errors))
-        ]);
-    }
+  const rows = data.error_by_state.map(
+      ({camera, state, position_m: e}) =>
+          [camera, state, String(e.count), length(e.rmse), length(e.median), length(e.max)]);
   const chart = lineChart(
       'Distance from the truth', 'mm',
       cameras.map(camera => ({
@@ -97,7 +90,7 @@ function timeSection() {
       known(period) ? {value: period, name: 'frame period ' + withUnit(period, 'ms')} : null;
   const most = Math.max(...stages.map(([, t]) => t.p95)),
         shown = limit && limit.value < 20 * most ? limit : null;
-  const summary = data.summary || {}, cpu = [...frames.cpu_ms].filter(known);
+  const summary = data.summary || {}, behind = data.behind_ms;
   return make(
       'section', {}, tiles([
         ['the run took', withUnit(summary.seconds, 's', 4), 'seconds'],
@@ -105,10 +98,9 @@ function timeSection() {
         ['frame period, median', withUnit(period, 'ms', 4)],
         ['mode', String(at(summary, 'options.mode') || '–'), 'options.mode'],
         ['frames dropped', String(at(summary, 'frames.dropped') ?? '–'), 'frames.dropped'],
-        [
-          'CPU time per stereo frame, mean',
-          cpu.length ? withUnit(cpu.reduce((a, b) => a + b, 0) / cpu.length, 'ms') : '–'
-        ]
+        ['CPU time per stereo frame, mean', withUnit(at(data, 'cpu_ms.mean'), 'ms'), 'cpu_ms.mean'],
+        ['behind, median', behind ? withUnit(behind.median, 'ms') : '–', 'behind_ms.median'],
+        ['behind, 95 % at most', behind ? withUnit(behind.p95, 'ms') : '–', 'behind_ms.p95']
       ]),
       make(
           'p', {class: 'soft'},

@@ -45,6 +45,12 @@ function timelineSection() {
   for (const chart
            of [lineChart('Inliers', '', lines('inliers')),
                lineChart('Features', '', lines('features')),
+               lineChart(
+                   'Rows of the pair apart by, median of the matches', 'px',
+                   lines('row_error_px').slice(0, 1)),
+               lineChart(
+                   'Behind: from when the pair was due until it was tracked', 'ms',
+                   lines('behind_ms').slice(0, 1)),
                lineChart('Position uncertain by, 1 sigma', 'mm', lines('sigma_position', 1000)),
                lineChart('Turned by, 1 sigma', '°', lines('sigma_rotation_deg'))])
     if (chart) section.append(chart);

@@ -1,5 +1,6 @@
 #include "apps/slam/live/live_run.h"
 
+#include <chrono>
 #include <deque>
 #include <utility>
 
@@ -61,6 +62,7 @@ class LivePush {
       if (!failure.empty()) books.failed({failure});
     }
     cameras_.info.times.push_back(seconds_of_stamp(set.left.stamp));
+    books.due(time, std::chrono::steady_clock::now());
     return push(moment_of(std::move(set), time), session);
   }
 

@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 
-from browsers import check, cpu_seconds, h1, json_of, open_browser, program_of
+from browsers import Chromium, check, cpu_seconds, h1, json_of, open_browser, program_of
 
 SECTIONS = ("map", "timeline", "coverage", "calibration", "loops", "truth", "time", "run")
 LANDMARKS = 100_000
@@ -86,6 +86,29 @@ def check_map(browser):
     check(drawn > 1000, "the map is drawn: %d pixels" % drawn)
 
 
+def check_coverage(browser):
+    """The place under the pointer is told, and a click there chooses a frame."""
+    browser.value("selection.set(frames.count - 1)")
+    told, chosen = browser.value("""(() => { const picture = document.querySelector('.grid-box svg'), box = picture.getBoundingClientRect(),
+      at = {clientX: box.left + box.width / 2, clientY: box.top + box.height / 2, bubbles: true};
+      picture.dispatchEvent(new PointerEvent('pointermove', at));
+      picture.dispatchEvent(new MouseEvent('click', at));
+      return [document.getElementById('under').textContent, selection.frame]; })()""")
+    check(re.search(r"right, .* up: (not seen|seen by \d+ stereo)", told), "the place under the pointer: " + told)
+    check(0 <= chosen and browser.value("frames.camera[%d]" % chosen) == 0, "a stereo frame above it: %d" % chosen)
+    check(browser.value("document.querySelectorAll('.grid-box .way').length") > 0, "the way over the ground")
+
+
+def check_print(browser):
+    """What is printed: images, and no table wider than the paper."""
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    browser.call("Emulation.setDeviceMetricsOverride", width=688, height=1017, deviceScaleFactor=1, mobile=False)  # A4 less its margins
+    hidden = browser.value("[...document.images].filter(one => one.getBoundingClientRect().width < 50).length")
+    check(hidden == 0, "%d images are not printed" % hidden)
+    wide = browser.value("[...document.querySelectorAll('section table')].filter(one => one.getBoundingClientRect().right > innerWidth).length")
+    check(wide == 0, "%d tables are wider than the paper" % wide)
+
+
 def look_at_report(browser, path, out, pictures):
     with open(path, encoding="utf-8") as file:
         html = file.read()
@@ -103,9 +126,15 @@ def look_at_report(browser, path, out, pictures):
     check(browser.value("document.querySelector('[data-figure=\"frames.dropped\"]').textContent") == str(summary["frames"]["dropped"]),
           "dropped")
     check_map(browser)
+    check_coverage(browser)
+    charts = browser.value("[...document.querySelectorAll('#timeline h3')].map(one => one.textContent).join()")
+    check("Rows of the pair" in charts, "rows in the timeline: " + charts)
+    check(browser.value("document.querySelectorAll('#calibration svg[role=img]').length") >= 3, "noise floors by place")
     if pictures:
         browser.screenshot(os.path.join(pictures, "report.png"))
     browser.check_quiet("file://" + path)
+    if isinstance(browser, Chromium):
+        check_print(browser)
     return values
 
 

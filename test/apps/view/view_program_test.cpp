@@ -113,6 +113,11 @@ void check_frame(const Json& told, std::map<std::string, std::string>& written) 
   }
   check_number(told["sigma_position"], written["sigma_position"], 1e-5);
   check_number(told["sigma_rotation_deg"], written["sigma_rotation_deg"], 1e-5);
+  if (written["row_error_px"].empty()) {
+    CHECK(told["row_error_px"].is_null());
+  } else {
+    CHECK(std::abs(told["row_error_px"].get<double>() - std::stod(written["row_error_px"])) < 1e-4);
+  }
   const char* const axes[] = {"tx", "ty", "tz"};
   for (std::size_t k = 0; k < 3; ++k) {
     check_number(written["tx"].empty() ? told["position"] : told["position"][k], written[axes[k]],

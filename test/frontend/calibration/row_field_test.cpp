@@ -3,6 +3,8 @@
 #include <catch2/catch.hpp>
 #include <random>
 
+#include "frontend/calibration/rig_calibrator.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -26,6 +28,24 @@ TEST_CASE("what is systematic in the rows is told without their noise", "[row_fi
   CHECK(off.at(47).mean() == Approx(0.4).margin(0.15));
   CHECK(field_of([](double, double) { return 0.0; }, 4000, 1).systematic_rms() < 0.02);
   CHECK(RowField(512, 384).systematic_rms() == 0);
+}
+
+TEST_CASE("a pair's error of the rows is the median of its matches of small keypoints",
+          "[row_field]") {
+  StereoFeatures features;
+  CHECK_FALSE(row_error(features));
+  const auto add = [&](float rows, float scale, bool matched) {
+    const auto place = static_cast<float>(features.left.keypoints.size());
+    features.right_of_left.push_back(matched ? static_cast<int>(place) : -1);
+    features.left.keypoints.push_back({10 * place, 100, scale, 0, 1, 1});
+    features.right.keypoints.push_back({10 * place, 100 - rows, scale, 0, 1, 1});
+  };
+  add(0.25F, 2, true);
+  add(-0.5F, 2, true);
+  add(0.75F, 3, true);
+  add(40, 2, false);
+  add(0.9F, 8, true);  // large
+  CHECK(row_error(features).value() == 0.5);
 }
 
 }  // namespace
