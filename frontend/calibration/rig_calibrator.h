@@ -57,6 +57,7 @@ inline constexpr double kDoubtfulScale = 0.01;
 
 // Of the left keypoints with a right match [px]; 0 without any.
 double median_disparity(const FeatureSet& left, const std::vector<float>& u_right);
+
 // Median of the absolute differences of the matches' rows [px]; none without matches. The matcher
 // takes none that are a pixel or more apart: of larger errors there are hardly any matches.
 std::optional<double> row_error(const StereoFeatures& features);
