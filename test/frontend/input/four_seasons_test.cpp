@@ -209,7 +209,7 @@ TEST_CASE("a 4Seasons recording that cannot be used is refused with one line") {
   CHECK(line.find(expected) != std::string::npos);
 }
 
-TEST_CASE("--layout 4seasons wants such a recording") {
+TEST_CASE("the layout 4seasons wants such a recording") {
   const TempFolder folder;
   CHECK(open_complaint(folder.path(), "", SequenceLayout::kFourSeasons)
             .find("no 4Seasons sequence here") != std::string::npos);
