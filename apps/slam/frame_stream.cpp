@@ -117,13 +117,15 @@ void FrameStream::append(SensorInput input) {
 
 void FrameStream::drop_oldest(CameraKind camera) {
   const auto droppable = [&](const Released& one) { return one.camera == camera && !one.first; };
-  const auto waiting = std::count_if(released_.begin(), released_.end(), droppable);
+  auto waiting = std::count_if(released_.begin(), released_.end(), droppable);
   caught_up_ = caught_up_ || waiting > kStartBacklog;
-  if (!caught_up_ || waiting <= kBacklog) return;
-  const auto oldest = std::find_if(released_.begin(), released_.end(), droppable);
-  leave_out(camera, oldest->time, kDropped);
-  released_.erase(oldest);
-  ++counts_of(camera).dropped;
+  if (!caught_up_) return;
+  for (; waiting > kBacklog; --waiting) {
+    const auto oldest = std::find_if(released_.begin(), released_.end(), droppable);
+    leave_out(camera, oldest->time, kDropped);
+    released_.erase(oldest);
+    ++counts_of(camera).dropped;
+  }
 }
 
 void FrameStream::leave_out(CameraKind camera, Nanoseconds time, const char* reason) {
