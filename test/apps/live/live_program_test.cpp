@@ -195,6 +195,7 @@ TEST_CASE("live: what cannot be used ends in one line") {
   }
   refused({"--watch", "dive", "--right", "late", "--timeout", "1"}, 3,
           "dive/left: left and right have no times in common: the least difference is 5.7e+03 ms");
+  refused({"--watch", "dive", "--right", "fisheye"}, 3, "right camera: calibrated for 320x240");
   fs::remove_all(folder.path() / "dive/left");
   fs::copy(folder.path() / "dive/fisheye", folder.path() / "dive/left");
   refused({"--watch", "dive"}, 3, "320x240");
