@@ -17,6 +17,7 @@
 #include "apps/slam/live/watched_source.h"
 #include "apps/slam/log.h"
 #include "cameras/files/input_error.h"
+#include "cameras/files/output_file.h"
 #include "frontend/input/text_file.h"
 
 namespace hybrid_slam {
@@ -71,6 +72,9 @@ std::unique_ptr<SetSource> open_folder(const LiveLine& line) {
   options.reading = line.run.input.options.images;
   return std::make_unique<WatchedSource>(std::move(options));
 }
+
+// Those of the run that a recording is of.
+fs::path options_of(const fs::path& recording) { return recording / "options.yaml"; }
 
 Json by_camera(const PerCamera<std::int64_t>& counts) {
   Json json;
@@ -162,6 +166,10 @@ class LiveInput final : public RunInput {
     if (cameras_.info.fisheye) command += fmt::format(" --fisheye {}/fisheye", folder);
     command += " --calibration";
     for (const std::string& file : recorder_->calibration()) command += " " + file;
+    command += " --config " + options_of(folder).string();
+    if (!line_.run.map.empty()) command += " --map " + line_.run.map;
+    if (!line_.run.vocabulary.empty()) command += " --vocabulary " + line_.run.vocabulary;
+    if (line_.run.localize) command += " --localize";
     return command +
            (cameras_.images == FootageImages::kRaw ? " --images raw" : " --images rectified");
   }
@@ -185,6 +193,7 @@ int run(const LiveLine& line, const Interrupt& interrupt) {
   std::optional<SetRecorder> recorder;
   if (!line.record.empty()) {
     recorder.emplace(line.record, line.run.input.footage.calibration, !line.fisheye.empty());
+    write_file(options_of(line.record), write_slam_options(line.run.options));
   }
   auto source = line.watch.empty() ? open_streams(line) : open_folder(line);
   source->set_tell([&](const std::string& text) {

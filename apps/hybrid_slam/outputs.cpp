@@ -133,8 +133,11 @@ FigureTables write_tables(const std::filesystem::path& out, const RunResult& res
   write_coverage(out / "coverage.csv", tables.coverage);
   tables.calibration = calibration_figures(map, result.rig.get());
   write_calibration(out / "calibration.csv", map, tables.calibration);
+  // Two streams of which one is seconds late look like this.
   for (const std::string& reason : tables.calibration.reasons) {
-    spdlog::warn("the rig should be calibrated again: {}", reason);
+    spdlog::warn(
+        "the rig should be calibrated again, unless left and right are of different moments: {}",
+        reason);
   }
   tables.story = story_of(out, map);
   return tables;

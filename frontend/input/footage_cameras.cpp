@@ -70,7 +70,8 @@ std::unique_ptr<const StereoRectifier> read_footage_cameras(const Footage& foota
   const PairCalibration pair = read_pair(footage, sizes.left);
   auto rectifier = take_calibration(pair, images, sizes.left, info);
   if (sizes.right) {
-    check_image_size(*sizes.right, rectifier ? rectifier->right_size() : sizes.left, pair.source);
+    check_image_size(*sizes.right, rectifier ? rectifier->right_size() : sizes.left,
+                     pair.source + ": right camera");
   }
   if (!footage.fisheye.empty()) {
     info.fisheye = read_fisheye_of_images(footage.calibration.back(), sizes.fisheye, info.warnings);

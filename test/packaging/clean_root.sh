@@ -25,7 +25,7 @@ else
     { tail -n 1 "$folder/log"; skip "no root could be made from $mirror"; }
 fi
 mount -t proc proc "$root/proc"
-cp "$folder"/packages/{hybrid-slam_,python3-hybrid-slam_}*.deb "$root/tmp/"
+cp "$folder"/packages/{hybrid-slam_,hybrid-slam-live_,python3-hybrid-slam_}*.deb "$root/tmp/"
 ls "$root"/tmp/*.deb
 
 inside apt-get -qq update
@@ -44,8 +44,14 @@ inside hybrid_slam --version
 inside scene_renderer /root/data --sequence demo --frames 8 --resolution 320x240 >/dev/null
 inside hybrid_slam /root/data --out /root/out --quiet
 [[ $(wc -l <"$root/root/out/stereo.tum") -ge 6 ]]
-say "the man page, the completion, the vocabulary"
-gzip -dc "$root/usr/share/man/man1/hybrid_slam.1.gz" | grep -q -- '--sequence\|\\-\\-sequence'
+say "cameras"
+said=$(inside hybrid_slam live --left rtsp://127.0.0.1:9/none --split --timeout 10 --out /root/live \
+  --calibration /root/data/hybrid/calibration/{left,right}_camera.yaml 2>&1) && status=0 || status=$?
+[[ $status -eq 3 && $said == *"cannot be opened"* ]] || { echo "live: exit code $status: $said"; exit 1; }
+say "the man pages, the completion, the vocabulary"
+has_option() { gzip -dc "$root/usr/share/man/man1/$1.1.gz" | grep -q -- "--$2\|\\\\-\\\\-$2"; }
+has_option hybrid_slam sequence
+has_option hybrid_slam-live record
 inside bash -c 'source /usr/share/bash-completion/completions/hybrid_slam
   COMP_WORDS=(hybrid_slam --lay) COMP_CWORD=1; _hybrid_slam hybrid_slam; [[ ${COMPREPLY[*]} == --layout ]]
   COMP_WORDS=(hybrid_slam --mode ev) COMP_CWORD=2; _hybrid_slam hybrid_slam; [[ ${COMPREPLY[*]} == every-frame ]]'
@@ -64,7 +70,7 @@ session.trajectory().write_tum("/root/python.tum")'
   cmp "$root/root/python.tum" "$root/root/out/stereo.tum"
 fi
 
-inside sh -c 'apt-get -qq purge -y hybrid-slam $(dpkg-query -W -f "\${Package} " python3-hybrid-slam 2>/dev/null)' \
+inside sh -c 'apt-get -qq purge -y hybrid-slam hybrid-slam-live $(dpkg-query -W -f "\${Package} " python3-hybrid-slam 2>/dev/null)' \
   >"$folder/log" 2>&1 || { tail -n 5 "$folder/log"; exit 1; }
 find_files >"$folder/after"
 diff "$folder/before" "$folder/after" || { echo "removing the packages left files"; exit 1; }

@@ -105,7 +105,8 @@ std::unique_ptr<ImageStream> open_stream(const std::string& name, double timeout
   } catch (const InputError& error) {
     const std::string reason = error.what();
     if (reason.starts_with(name)) throw;
-    throw InputError(name + ": streams are read by the program " + reason);
+    throw InputError(name + ": streams are read by another program: " + reason +
+                     " (Debian package hybrid-slam-live)");
   }
 }
 

@@ -132,14 +132,16 @@ class Slam:
             check(self.changed.wait_for(lambda: text in self.said or self.process.poll() is not None, PATIENCE) and text in self.said,
                   "it says \"%s\", not \"%s\"" % (text, self.said))
 
-    def waited(self):
-        """For a core, all threads together [s]."""
+    def core_times(self):
+        """How long its threads ran, and how long they waited for a core, all together [s]."""
         tasks = "/proc/%d/task" % self.process.pid
-        total = 0
+        ran = waited = 0
         for task in os.listdir(tasks):
             with open(os.path.join(tasks, task, "schedstat"), encoding="utf-8") as file:
-                total += int(file.read().split()[1])
-        return total / 1e9
+                times = file.read().split()
+            ran += int(times[0]) / 1e9
+            waited += int(times[1]) / 1e9
+        return ran, waited
 
     def end(self):
         self.process.send_signal(signal.SIGINT)
@@ -203,7 +205,7 @@ def try_case(name, program, evaluate, dataset, frames, of_files):
                 cameras.go()
             check(cameras.process.stdout.readline() == "over\n", "all was sent")
             time.sleep(3)  # what a decoder holds
-            waited = slam.waited()
+            ran, waited = slam.core_times()
             slam.end()
         finally:
             cameras.stop()
@@ -216,10 +218,15 @@ def try_case(name, program, evaluate, dataset, frames, of_files):
     live, counts = summary["live"], summary["frames"]
     print("%s: %d sets, %d tracked, %d lost, %d dropped + %s before; %d of %d frames of the sequence, ATE %.4f cm (files: %.4f); grey levels off by %.2f" % (
         name, live["sets"], counts["tracked"], counts["lost"], counts["dropped"], live["dropped"], len(found), frames, ate, of_files, off))
-    print("    lost streams: %s; held up: %s; alone: %s; its threads waited %.1f s for a core" % (
-        live["lost"], live["held_up"], live["alone"], waited), flush=True)
+    print("    lost streams: %s; held up: %s; alone: %s; its threads ran for %.1f s and waited %.1f s for a core" % (
+        live["lost"], live["held_up"], live["alone"], ran, waited), flush=True)
+    if len(sides) == 3:
+        fisheye = summary["fisheye"]["frames"]
+        print("    fisheye: %d of %d registered" % (fisheye["registered"], fisheye["read"]), flush=True)
+        check(fisheye["read"] > frames // 2 and fisheye["registered"] == fisheye["read"], "the fisheye is tracked")
     check(counts["lost"] == 0, "no frame is lost")
     check(counts["tracked"] == counts["read"] - counts["corrupt"], "what was not dropped is tracked")
+    check(counts["dropped"] == 0 or waited > ran, "nothing is dropped unless others have the cores")
     check(live["lost"]["left"] >= int(cut), "a stream that is cut is said to be lost")
     check(cut or len(found) + counts["dropped"] + sum(live["dropped"].values()) >= frames - 6, "all frames came: %s" % sorted(found))
     check(not cut or max(found) > frames // 2, "it goes on")
