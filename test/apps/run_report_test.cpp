@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -198,6 +200,24 @@ TEST_CASE("losses are told with their causes; what was left out is none", "[repo
   CHECK(story.losses[0].cause == "dark, few_features");  // of half of the frames at least
   CHECK(story.frames[1].world_from_cam->translation().x() == 0.5);
   CHECK(std::isnan(story.frames[4].features));
+}
+
+TEST_CASE("a frame that began a component lies where the map has it in the end", "[report]") {
+  const TempFolder folder;
+  const FilledMap filled = hybrid_map(0);
+  const MapSnapshot& map = filled.map.view();
+  const Keyframe* const keyframe = map.newest_keyframe(CameraId(0));
+  REQUIRE(keyframe != nullptr);
+  write(folder.path() / "frames.csv",
+        fmt::format("camera,time,index,state,tx,ty,tz,qx,qy,qz,qw,reference,features\n"
+                    "{},1,{},starting,70,80,90,0,0,0,1,,500\n",
+                    baseline(map.camera(CameraId(0))) > 0 ? "stereo" : "fisheye",
+                    keyframe->observations->frame_index));
+  const auto pose = read_story(folder.path(), &map).frames.at(0).world_from_cam;
+  REQUIRE(pose);
+  const Rigid3d expected = inverse(keyframe->cam_from_world);
+  CHECK((pose->translation() - expected.translation()).norm() < 1e-12);
+  CHECK(read_story(folder.path(), nullptr).frames.at(0).world_from_cam->translation().x() == 70);
 }
 
 TEST_CASE("what happened is summed up: losses, times, errors by state", "[report]") {
