@@ -52,8 +52,9 @@ std::shared_ptr<const NoiseFloor> floor_of(const ResidualMap& residuals);
 // The rows of the matches.
 void add_rows(const StereoFeatures& features, RowField& rows);
 
-// Median of the absolute differences of the matches' rows [px]; none without matches. The matcher
-// takes none that are a pixel or more apart: of larger errors there are hardly any matches.
+// Median of the absolute differences of the matches' rows [px], of small keypoints; none without
+// matches. The matcher takes none that are farther apart than StereoMatcherOptions allow: of larger
+// errors there are hardly any matches.
 std::optional<double> row_error(const StereoFeatures& features);
 
 // Of the matches [px]; 0 without any.
