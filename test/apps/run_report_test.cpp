@@ -287,6 +287,8 @@ TEST_CASE("the verdict names what speaks against the calibration, and what realt
         "120 ms");
   summary["frames"]["dropped"] = 2;
   CHECK(text_of(summary, "time", false).find(": 2 frames dropped") != std::string::npos);
+  summary["fisheye"]["frames"]["dropped"] = 30;
+  CHECK(text_of(summary, "time", false).find(": 32 frames dropped") != std::string::npos);
 }
 
 TEST_CASE("how uncertain places of parts are is not how uncertain positions are", "[report]") {
@@ -319,6 +321,9 @@ TEST_CASE("the verdict says what the summary says", "[report]") {
   CHECK(level(10, 8, 2) == "parts");
   CHECK(level(10, 0, 0) == "nothing");
   CHECK(verdict(Json(), RunStory(), MapFigures())["level"] == "unknown");
+  RunStory broken_off;  // without summary.json
+  broken_off.frames.emplace_back();
+  CHECK(verdict(Json(), broken_off, MapFigures())["reasons"][0]["good"] == true);
 }
 
 TEST_CASE("data keep to their size: landmarks are thinned evenly, and it is said", "[report]") {
