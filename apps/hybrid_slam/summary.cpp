@@ -65,7 +65,8 @@ Json fisheye_json(const RunResult& result, const RunSummary& summary) {
   Json json;
   json["frames"] = {{"read", frames.read},       {"registered", frames.tracked},
                     {"coasted", frames.coasted}, {"other_components", frames.other_components},
-                    {"lost", frames.lost},       {"missing", frames.corrupt}};
+                    {"lost", frames.lost},       {"missing", frames.corrupt},
+                    {"dropped", frames.dropped}};
   json["poses_from"] = count_by(result.fisheye_records,
                                 [](const RecordedFrame& frame) { return to_string(frame.source); });
   add_conditions(json, result.fisheye_conditions);

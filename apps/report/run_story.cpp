@@ -30,12 +30,31 @@ std::optional<KeyframeId> keyframe_at(const ResultTable& table, std::size_t row,
   return KeyframeId(static_cast<std::uint32_t>(id));
 }
 
-// The map's, through the keyframe that the frame follows.
+// The keyframe that a frame became.
+const Keyframe* keyframe_of(const ResultTable& table, std::size_t row, const MapSnapshot& map) {
+  const double index = table.number(row, "index");
+  if (!(index >= 0)) return nullptr;
+  const bool stereo = table.text(row, "camera") != "fisheye";
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    const CameraId camera(i);
+    if ((baseline(map.camera(camera)) > 0) != stereo) continue;
+    const Keyframe* const found = map.find_frame(camera, static_cast<std::int64_t>(index));
+    if (found != nullptr) return found;
+  }
+  return nullptr;
+}
+
+// The map's, through the keyframe that the frame follows. One that begins a component follows none,
+// but has become a keyframe.
 std::optional<Rigid3d> final_pose(const ResultTable& table, std::size_t row,
                                   const MapSnapshot* map) {
   const auto online = pose_at(table, row, "");
   const auto reference = keyframe_at(table, row, "reference");
   const auto reference_from_cam = pose_at(table, row, "reference_");
+  if (map != nullptr && online && !reference) {
+    const Keyframe* const own = keyframe_of(table, row, *map);
+    return own != nullptr ? inverse(own->cam_from_world) : online;
+  }
   if (map == nullptr || !online || !reference || !reference_from_cam ||
       *reference >= map->next_keyframe_id()) {
     return online;

@@ -104,7 +104,10 @@ class Reasons {
           false);
     }
     if (story_.losses.empty() && !story_.frames.empty()) {
-      add("lost", "never lost: every frame of every camera has a pose", true);
+      add("lost",
+          dropped_frames() > 0 ? "never lost: every frame that was not dropped has a pose"
+                               : "never lost: every frame of every camera has a pose",
+          true);
     }
   }
 
@@ -159,7 +162,7 @@ class Reasons {
   void add_time() {
     const double seconds = number_at(summary_, {"seconds"});
     if (!(seconds > 0) || !(story_.span > 0)) return;
-    const int dropped = count_at(summary_.value("frames", Json::object()), "dropped");
+    const int dropped = dropped_frames();
     const Json options = summary_.value("options", Json::object());
     if (options.value("mode", "") == "realtime") return add_realtime(options, dropped);
     add("time",
@@ -167,6 +170,14 @@ class Reasons {
                     seconds <= story_.span ? "faster than the cameras" : "slower than the cameras",
                     dropped > 0 ? fmt::format("; {} frames dropped", dropped) : ""),
         seconds <= story_.span && dropped == 0);
+  }
+
+  // Of both cameras.
+  int dropped_frames() const {
+    if (!summary_.is_object()) return 0;
+    const Json fisheye = summary_.value("fisheye", Json::object());
+    return count_at(summary_.value("frames", Json::object()), "dropped") +
+           count_at(fisheye.value("frames", Json::object()), "dropped");
   }
 
   // Images come by the clock then, and what is too much for the machine is dropped.

@@ -58,8 +58,9 @@ inline constexpr double kDoubtfulScale = 0.01;
 // Of the left keypoints with a right match [px]; 0 without any.
 double median_disparity(const FeatureSet& left, const std::vector<float>& u_right);
 
-// Median of the absolute differences of the matches' rows [px]; none without matches. The matcher
-// takes none that are a pixel or more apart: of larger errors there are hardly any matches.
+// Median of the absolute differences of the matches' rows [px], of small keypoints; none without
+// matches. The matcher takes none that are farther apart than StereoMatcherOptions allow: of larger
+// errors there are hardly any matches.
 std::optional<double> row_error(const StereoFeatures& features);
 
 }  // namespace hybrid_slam

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -200,6 +202,24 @@ TEST_CASE("losses are told with their causes; what was left out is none", "[repo
   CHECK(std::isnan(story.frames[4].features));
 }
 
+TEST_CASE("a frame that began a component lies where the map has it in the end", "[report]") {
+  const TempFolder folder;
+  const FilledMap filled = hybrid_map(0);
+  const MapSnapshot& map = filled.map.view();
+  const Keyframe* const keyframe = map.newest_keyframe(CameraId(0));
+  REQUIRE(keyframe != nullptr);
+  write(folder.path() / "frames.csv",
+        fmt::format("camera,time,index,state,tx,ty,tz,qx,qy,qz,qw,reference,features\n"
+                    "{},1,{},starting,70,80,90,0,0,0,1,,500\n",
+                    baseline(map.camera(CameraId(0))) > 0 ? "stereo" : "fisheye",
+                    keyframe->observations->frame_index));
+  const auto pose = read_story(folder.path(), &map).frames.at(0).world_from_cam;
+  REQUIRE(pose);
+  const Rigid3d expected = inverse(keyframe->cam_from_world);
+  CHECK((pose->translation() - expected.translation()).norm() < 1e-12);
+  CHECK(read_story(folder.path(), nullptr).frames.at(0).world_from_cam->translation().x() == 70);
+}
+
 TEST_CASE("what happened is summed up: losses, times, errors by state", "[report]") {
   const TempFolder folder;
   write(folder.path() / "frames.csv", kFrames);
@@ -267,6 +287,8 @@ TEST_CASE("the verdict names what speaks against the calibration, and what realt
         "120 ms");
   summary["frames"]["dropped"] = 2;
   CHECK(text_of(summary, "time", false).find(": 2 frames dropped") != std::string::npos);
+  summary["fisheye"]["frames"]["dropped"] = 30;
+  CHECK(text_of(summary, "time", false).find(": 32 frames dropped") != std::string::npos);
 }
 
 TEST_CASE("how uncertain places of parts are is not how uncertain positions are", "[report]") {
@@ -299,6 +321,9 @@ TEST_CASE("the verdict says what the summary says", "[report]") {
   CHECK(level(10, 8, 2) == "parts");
   CHECK(level(10, 0, 0) == "nothing");
   CHECK(verdict(Json(), RunStory(), MapFigures())["level"] == "unknown");
+  RunStory broken_off;  // without summary.json
+  broken_off.frames.emplace_back();
+  CHECK(verdict(Json(), broken_off, MapFigures())["reasons"][0]["good"] == true);
 }
 
 TEST_CASE("data keep to their size: landmarks are thinned evenly, and it is said", "[report]") {

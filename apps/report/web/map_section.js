@@ -86,6 +86,9 @@ function mapSection() {
                 data.keyframes.camera.includes(1) ? swatch('var(--truth)', 'fisheye') : '') :
             '',
         data.truth.count ? make('div', {}, swatch('var(--ink)', 'truth')) : '',
+        data.loops.some(loop => loop.outcome === 'accepted') ?
+            make('div', {}, swatch('var(--s-lost)', 'loops that were closed')) :
+            '',
         factor ?
             make(
                 'div', {},

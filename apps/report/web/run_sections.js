@@ -141,8 +141,26 @@ function flattened(value, prefix, rows) {
   return rows;
 }
 
+// What the command line says where it says nothing.
+const USUAL = {
+  mode: 'every-frame',
+  rate: 0,
+  limit: 0,
+  start: 0,
+  every: 1,
+  loops: true,
+  map: null,
+  localize: false
+};
+
 function runSection() {
-  const summary = data.summary || {}, changed = summary.options_changed;
+  const summary = data.summary || {}, given = summary.options || {};
+  const changed = summary.options_changed && {
+    ...Object.fromEntries(Object.keys(USUAL)
+                              .filter(name => name in given && given[name] !== USUAL[name])
+                              .map(name => [name, String(given[name])])),
+    ...summary.options_changed
+  };
   const parts = [
     [
       'program',

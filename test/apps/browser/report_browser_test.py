@@ -127,6 +127,8 @@ def look_at_report(browser, path, out, pictures):
           "dropped")
     check_map(browser)
     check_coverage(browser)
+    changed = browser.value("[...document.querySelectorAll('#run .wide tr')].map(one => one.innerText.split(/\\s+/).join(' '))")
+    check("limit 8" in changed, "the limit among the options that differ: " + "; ".join(changed))
     charts = browser.value("[...document.querySelectorAll('#timeline h3')].map(one => one.textContent).join()")
     check("Rows of the pair" in charts, "rows in the timeline: " + charts)
     check(browser.value("document.querySelectorAll('#calibration svg[role=img]').length") >= 3, "noise floors by place")
