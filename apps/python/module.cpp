@@ -13,8 +13,8 @@ void bind_errors(py::module_& module) {
       PyErr_NewExceptionWithDoc("hybrid_slam.Error", "What this package raises.", nullptr, nullptr);
   const auto kind = [&](const char* name, const char* doc, PyObject* builtin) {
     const py::tuple bases = builtin != nullptr
-                                ? py::make_tuple(py::handle(error), py::handle(builtin))
-                                : py::make_tuple(py::handle(error));
+                                ? py::tuple(py::make_tuple(py::handle(error), py::handle(builtin)))
+                                : py::tuple(py::make_tuple(py::handle(error)));
     return PyErr_NewExceptionWithDoc(name, doc, bases.ptr(), nullptr);
   };
   static PyObject* const input =
