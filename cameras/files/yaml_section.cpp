@@ -44,7 +44,7 @@ YamlSection YamlSection::read(const std::string& path) {
     }
     return {path, "", root};
   } catch (const YAML::Exception& error) {
-    throw InputError(path + ":" + line_of(error.mark) + ": not YAML: " + error.msg);
+    throw InputError(path + ":" + line_of(error.mark) + ": not YAML: " + printable(error.msg));
   }
 }
 

@@ -292,6 +292,9 @@ TEST_CASE("Fisheye: words of a file stand in one line of an error") {
       fisheye_error("cam0:\n  camera_model: \"pin\\nhole\"\n  distortion_model: none\n"
                     "  resolution: [4, 4]\n") ==
       "fish.yaml:2: cam0.camera_model: 'pin?hole' is not supported (pinhole, ds, eucm, omni are)");
+  // The parser's own words hold the character that it does not know.
+  CHECK(fisheye_error("a: \"\\\n\"\n").find('\n') == std::string::npos);
+  CHECK(fisheye_error("a: \"\\\x1e\"\n").find('\x1e') == std::string::npos);
 }
 
 TEST_CASE("Fisheye: formats of ORB-SLAM3, stella_vslam, Basalt and ROS 2") {
