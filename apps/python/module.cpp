@@ -41,11 +41,23 @@ void bind_errors(py::module_& module) {
   });
 }
 
+// pybind11 before 2.12 reads the arrays of NumPy 2 where NumPy 1 had their fields: numbers come out
+// wrong without a word.
+void refuse_unknown_numpy() {
+  if (PYBIND11_VERSION_HEX >= 0x020C0000) return;
+  const std::string version = py::module_::import("numpy").attr("__version__").cast<std::string>();
+  if (std::stoi(version) < 2) return;
+  throw py::import_error(
+      "hybrid_slam was built with a pybind11 that does not know NumPy " + version +
+      ": install numpy<2, or build the module with `pip install .`, which brings a newer one");
+}
+
 }  // namespace
 }  // namespace hybrid_slam::python
 
 PYBIND11_MODULE(_native, module) {
   using namespace hybrid_slam::python;
+  refuse_unknown_numpy();
   hybrid_slam::silence_solver_log();
   module.attr("__name__") = "hybrid_slam";  // where users find the classes
   bind_errors(module);

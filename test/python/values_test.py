@@ -1,4 +1,6 @@
 import os
+import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -32,6 +34,21 @@ class Cameras(unittest.TestCase):
             hs.read_fisheye("/nowhere.yaml")
         self.assertTrue(issubclass(hs.UsageError, ValueError))
         self.assertTrue(issubclass(hs.InputError, hs.Error))
+
+
+class NumPy(unittest.TestCase):
+    def test_one_that_the_build_does_not_know_is_refused(self) -> None:
+        # Debian's pybind11, which the build folder has, knows NumPy 1 alone.
+        with tempfile.TemporaryDirectory() as folder:
+            package = os.path.join(folder, "numpy")
+            os.mkdir(package)
+            with open(os.path.join(package, "__init__.py"), "w") as file:
+                file.write('__version__ = "2.1.0"\n')
+            paths = os.pathsep.join([folder, os.environ["PYTHONPATH"]])
+            tried = subprocess.run([sys.executable, "-c", "import hybrid_slam"], capture_output=True,
+                                   text=True, env={**os.environ, "PYTHONPATH": paths})
+        self.assertEqual(tried.returncode, 1)
+        self.assertIn("does not know NumPy 2.1.0: install numpy<2", tried.stderr)
 
 
 class Images(unittest.TestCase):
