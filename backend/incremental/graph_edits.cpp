@@ -76,6 +76,7 @@ bool IncrementalSolver::remove_pose(std::uint32_t index) {
   Variable& variable = variables_[pose.variable];
   const bool is_used =
       variable.fixed || !variable.terms.empty() || !variable.mixed.empty() ||
+      std::find(free_poses_.begin(), free_poses_.end(), index) != free_poses_.end() ||
       std::find(touched_.begin(), touched_.end(), pose.variable) != touched_.end() ||
       std::any_of(blocks_.begin(), blocks_.end(), [&](const Block& block) {
         return block.there && block.carrier == pose.variable;

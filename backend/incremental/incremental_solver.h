@@ -46,7 +46,7 @@ class IncrementalSolver final : private TermSource {
   void remove_observation(std::uint32_t observation);
   void remove_edge(std::uint32_t edge);
   // A pose of which no term is left since the last update: its place is another one's from now on.
-  // False if there is one, or if it cannot be: it is fixed, or the newest poses make a window.
+  // False if there is one, or if it cannot be: it is fixed, was removed, or poses make a window.
   bool remove_pose(std::uint32_t pose);
   void remove_point(std::uint32_t point);  // with its observations and factors
 

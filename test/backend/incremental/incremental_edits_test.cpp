@@ -205,6 +205,7 @@ TEST_CASE("incremental edits: a pose takes the place of one that went") {
     CHECK(!solver.remove_pose(pose));  // not before an update
     settle(solver, 5);
     CHECK(solver.remove_pose(pose));
+    CHECK(!solver.remove_pose(pose));  // once
     CHECK(cost(solver.graph()) == Approx(cost(before)).epsilon(1e-6));
   }
   CHECK(solver.pose_count() == count + 1);
