@@ -30,6 +30,24 @@ SlamOptions simulated_options(bool loops) {
   return options;
 }
 
+SyntheticSceneOptions long_corridor() {
+  SyntheticSceneOptions options;
+  options.trajectory = SceneTrajectory::kCorridor;
+  options.times = 2051;
+  options.step = 3;
+  options.landmarks = 60000;
+  return options;
+}
+
+SlamOptions keyframe_each_frame() {
+  SlamOptions options = simulated_options();
+  options.features = 400;
+  options.distribute();
+  options.tracking.keyframes.max_frames_between = 1;
+  options.culling.redundancy.observers = 1000;
+  return options;
+}
+
 ReplayOptions simulated_run(const SimulatedSource& source) {
   SyntheticScene some;
   const std::size_t stride = std::max<std::size_t>(1, source.scene().frames.size() / 16);

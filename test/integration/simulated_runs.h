@@ -17,6 +17,12 @@ SyntheticSceneOptions orbit_of(int times);
 
 SlamOptions simulated_options(bool loops = true);
 
+// Always onwards, for a map of 2000 keyframes and more if each frame becomes one.
+SyntheticSceneOptions long_corridor();
+
+// Each frame becomes a keyframe, and stays.
+SlamOptions keyframe_each_frame();
+
 // With a vocabulary of what is seen in the scene, of some of its frames.
 ReplayOptions simulated_run(const SimulatedSource& source);
 
