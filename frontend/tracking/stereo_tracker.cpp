@@ -335,6 +335,7 @@ TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, Tracke
     chain_.begin();
     matcher_.remember_keyframe(frame);
   }
+  untracked_ = result.tracked() ? std::nullopt : std::optional(frame);
   last_.remember(std::move(frame), result);
   return result;
 }

@@ -21,7 +21,9 @@
 namespace hybrid_slam {
 
 struct StereoTrackerOptions : TrackerOptions {
-  double min_initial_share = 0.08;  // of N: features, and features with depth, to start the map
+  // Of N: features, and features with depth, with which one frame starts the map. With fewer, two
+  // in a row do between which a motion is believed.
+  double min_initial_share = 0.08;
   double close_baselines = 40;   // nearer than this many baselines, one stereo pair fixes a point
   int min_new_points = 100;      // a keyframe makes at least the nearest ones
   double last_frame_radius = 7;  // [px]; doubled when too few match
@@ -77,6 +79,7 @@ class StereoTracker {
 
   TrackedFrame initialize(Frame& frame, const MapSnapshot& map) const;
   bool can_carry_map(const Frame& frame) const;
+  bool continues_untracked(const Frame& frame) const;
   void begin_component(Frame& frame, const MapSnapshot& map, TrackedFrame& result);
   void correct_disparities(Frame& frame) const;
   std::optional<LadderStep> predict(Frame& frame, TrackedFrame& result);
@@ -112,6 +115,7 @@ class StereoTracker {
   std::optional<UncertainPose> uncertain_;  // the last tracked frame
   double depth_ = 0;                        // of the scene that it showed [m]
   std::optional<Unplaced> unplaced_;        // after it; none right after it
+  std::optional<Frame> untracked_;          // the frame before, if that was not tracked
 };
 
 }  // namespace hybrid_slam

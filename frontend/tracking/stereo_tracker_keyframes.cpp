@@ -20,13 +20,22 @@ TrackedFrame StereoTracker::initialize(Frame& frame, const MapSnapshot& map) con
   return result;
 }
 
-// Whether one pair shows enough to begin a map, or a component of it.
+// Whether a frame shows enough to begin a map, or a component of it.
 bool StereoTracker::can_carry_map(const Frame& frame) const {
   const auto enough = static_cast<long>(options_.min_initial_share * options_.max_features);
   const auto& u_right = frame.features.u_right;
   const auto with_depth =
       std::count_if(u_right.begin(), u_right.end(), [](float u) { return !std::isnan(u); });
-  return static_cast<long>(frame.size()) >= enough && with_depth >= enough;
+  const bool many = static_cast<long>(frame.size()) >= enough && with_depth >= enough;
+  return many || continues_untracked(frame);
+}
+
+// Few points carry a map, too, if they led from the frame before to this one: that they will lead to
+// the next is as likely, and chance matches in the dark do not.
+bool StereoTracker::continues_untracked(const Frame& frame) const {
+  if (!untracked_) return false;
+  const auto step = ladder_.climb(*untracked_, frame);
+  return step && step->believed;
 }
 
 // Where the vehicle is against the map is not known: the frame gets the pose of the newest stereo

@@ -69,6 +69,28 @@ TEST_CASE("A map begins with a frame that has features enough, and depths enough
   CHECK_FALSE(tracked.keyframe->reference.valid());
 }
 
+TEST_CASE("Few features begin a map where two frames in a row show the same") {
+  const TrackedCircle world;
+  const Map empty;
+  StereoTrackerOptions options;
+  options.max_features = 100 * static_cast<int>(world.frame(0).size());
+  const auto track_two = [&](const Frame& first, const Frame& second) {
+    StereoTracker tracker(CameraId(0), world.camera(), options);
+    CHECK(tracker.track(first, empty.view()).source == PoseSource::kNone);
+    return tracker.track(second, empty.view());
+  };
+  const TrackedFrame tracked = track_two(world.frame(0), world.frame(1));
+  CHECK(tracked.source == PoseSource::kInitialization);
+  CHECK(tracked.keyframe.has_value());
+  CHECK(tracked.frame_index == 1);
+  CHECK(tracked.cam_from_world.params == Rigid3d().params);
+
+  Frame by_chance = world.frame(1);  // as many features, that look like others
+  std::reverse(by_chance.features.left.descriptors.begin(),
+               by_chance.features.left.descriptors.end());
+  CHECK(track_two(world.frame(0), by_chance).source == PoseSource::kNone);
+}
+
 TEST_CASE(
     "Without odometry the pose is predicted from the last motion, without one from the pose") {
   const TrackedCircle world;
