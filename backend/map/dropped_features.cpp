@@ -69,4 +69,11 @@ void keep_features(MapTables& tables, KeyframeId id, const std::vector<std::uint
   }
 }
 
+void keep_features(NewKeyframe& made, const std::vector<std::uint32_t>& kept) {
+  made.observations = chosen(*made.observations, kept);
+  made.landmarks = chosen(made.landmarks, kept);
+  if (made.odometry != nullptr) made.odometry = renumbered(*made.odometry, kept);
+  for (auto& [keypoint, point] : made.new_points) keypoint = new_keypoint(kept, keypoint).value();
+}
+
 }  // namespace hybrid_slam

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "backend/map/map_edit.h"
 #include "backend/map/map_tables.h"
 
 namespace hybrid_slam {
@@ -16,5 +17,8 @@ std::optional<std::uint32_t> new_keypoint(std::span<const std::uint32_t> kept,
 
 // Leaves a keyframe these of its features, ascending, among which are all that have a landmark.
 void keep_features(MapTables& tables, KeyframeId id, const std::vector<std::uint32_t>& kept);
+
+// The same of one that is not in the map yet; its new points are among the kept, too.
+void keep_features(NewKeyframe& made, const std::vector<std::uint32_t>& kept);
 
 }  // namespace hybrid_slam

@@ -10,6 +10,22 @@ namespace {
 constexpr double kMaxSeconds = 1;    // for which a velocity holds; uncertain long before
 constexpr double kRemembered = 0.9;  // of the mean of accelerations, per step
 
+bool is_same(const Keypoint& a, const Keypoint& b) {
+  return a.x == b.x && a.y == b.y && a.scale == b.scale && a.angle == b.angle;
+}
+
+// Those of the keyframe that the frame became. It has the same keypoints in the same order, but
+// some may have been left out.
+void take_landmarks(const Keyframe& keyframe, Frame& frame) {
+  const std::vector<Keypoint>& kept = keyframe.observations->features.keypoints;
+  const std::vector<Keypoint>& all = frame.features.left.keypoints;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const bool is_kept = next < kept.size() && is_same(kept[next], all[i]);
+    frame.landmarks[i] = is_kept ? keyframe.landmarks[next++] : LandmarkId();
+  }
+}
+
 }  // namespace
 
 void LastFrame::follow(const MapSnapshot& map) {
@@ -21,10 +37,7 @@ void LastFrame::follow(const MapSnapshot& map) {
     if (keyframe != nullptr && cam_from_requested_) {
       reference_ = keyframe->id;
       cam_from_reference_ = *cam_from_requested_;
-      const bool is_that = frame_->index == *requested_;
-      // Not so if it went out of use before this camera saw anything again.
-      const bool has_all_features = keyframe->landmarks.size() == frame_->size();
-      if (is_that && has_all_features) frame_->landmarks = keyframe->landmarks;
+      if (frame_->index == *requested_) take_landmarks(*keyframe, *frame_);
     }
     if (map.newest_frame_index(camera_) >= *requested_) {
       requested_.reset();

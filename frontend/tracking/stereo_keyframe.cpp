@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "backend/map/dropped_features.h"
 #include "backend/map/frame_observations.h"
 
 namespace hybrid_slam {
@@ -117,6 +118,14 @@ NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const
     keyframe.new_points.emplace_back(candidate.index, world_from_cam * candidate.point);
   }
   return keyframe;
+}
+
+void leave_out(const LeftOutKeypoints& left_out, NewKeyframe& keyframe) {
+  std::vector<std::uint32_t> kept;
+  for (std::uint32_t i = 0; i < left_out.size(); ++i) {
+    if (!left_out[i] || keyframe.landmarks[i].valid()) kept.push_back(i);
+  }
+  if (kept.size() < left_out.size()) keep_features(keyframe, kept);
 }
 
 }  // namespace hybrid_slam

@@ -8,8 +8,8 @@
 
 namespace hybrid_slam {
 
-// Keypoints of a frame of which no point shall be made, one entry each; empty: none. For what moves
-// by itself.
+// Keypoints of a frame of which no landmark shall be made, one entry each; empty: none. For what
+// moves by itself.
 using LeftOutKeypoints = std::vector<bool>;
 
 // What a stereo frame sees at depths that one pair can tell.
@@ -46,5 +46,9 @@ ReferenceOverlap reference_overlap(const MapSnapshot& map, KeyframeId reference,
 NewKeyframe make_stereo_keyframe(CameraId camera_id, const Camera& camera, const Frame& frame,
                                  KeyframeId reference, double close_depth, int min_new_points,
                                  const LeftOutKeypoints& left_out = {});
+
+// Takes out of a keyframe what shall be no landmark, unless it is one already: mapping would make
+// landmarks of it between keyframes, and find places by it.
+void leave_out(const LeftOutKeypoints& left_out, NewKeyframe& keyframe);
 
 }  // namespace hybrid_slam

@@ -109,10 +109,12 @@ bool StereoTracker::wants_keyframe(const Frame& frame, const MapSnapshot& map,
 
 NewKeyframe StereoTracker::make_keyframe(const Frame& frame, const MapSnapshot& map,
                                          KeyframeId reference) const {
+  const LeftOutKeypoints left_out = moving(frame);
   NewKeyframe keyframe = make_stereo_keyframe(camera_id_, camera_, frame, reference, close_depth(),
-                                              options_.min_new_points, moving(frame));
+                                              options_.min_new_points, left_out);
   const Keyframe* last = map.find_frame(camera_id_, last_.keyframe_frame());
   if (last != nullptr) keyframe.odometry = chain_.odometry(last->id);
+  leave_out(left_out, keyframe);
   return keyframe;
 }
 
