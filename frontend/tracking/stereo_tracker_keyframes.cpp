@@ -30,8 +30,8 @@ bool StereoTracker::can_carry_map(const Frame& frame) const {
   return many || continues_untracked(frame);
 }
 
-// Few points carry a map, too, if they led from the frame before to this one: that they will lead to
-// the next is as likely, and chance matches in the dark do not.
+// Few points carry a map, too, if they led from the frame before to this one: that they will lead
+// to the next is as likely, and chance matches in the dark do not.
 bool StereoTracker::continues_untracked(const Frame& frame) const {
   if (!untracked_) return false;
   const auto step = ladder_.climb(*untracked_, frame);

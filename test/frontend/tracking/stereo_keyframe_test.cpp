@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "backend/map/map.h"
+#include "frontend/tracking/last_frame.h"
 
 namespace hybrid_slam {
 namespace {
@@ -96,6 +97,54 @@ TEST_CASE("Where few points are close, the nearest of the others make new points
   CHECK(made(3) == std::vector<std::uint32_t>{6, 0, 4});
   CHECK(made(4) == std::vector<std::uint32_t>{6, 0, 4, 10});
   CHECK(made(100) == std::vector<std::uint32_t>{6, 0, 4, 10, 8});
+}
+
+TEST_CASE("What is left out of a keyframe is no keypoint of it, unless it is a landmark already") {
+  const Frame frame = frame_with({2, 2.5, 0, 0, 3.9, 4.1, 1, 8, 9, 3, 3.5});
+  LeftOutKeypoints left_out(11);
+  left_out[1] = left_out[2] = left_out[4] = true;  // a landmark, none, a new point
+  NewKeyframe keyframe =
+      make_stereo_keyframe(CameraId(2), camera(), frame, KeyframeId(5), 4, 0, left_out);
+  CHECK(new_keypoints(keyframe) == std::vector<std::uint32_t>{6, 0, 10});
+  const auto points = keyframe.new_points;
+  Odometry odometry;
+  odometry.keypoints = {2, 4, 5, 10};
+  keyframe.odometry = std::make_shared<const Odometry>(odometry);
+  leave_out(left_out, keyframe);
+  // 0, 1, 3, 5, 6, 7, 8, 9 and 10 stay.
+  REQUIRE(keyframe.observations->size() == 9);
+  CHECK(keyframe.observations->u_right.size() == 9);
+  CHECK(keyframe.observations->features.keypoints[2].y == 103);
+  CHECK(keyframe.observations->dropped == 2);
+  CHECK(keyframe.landmarks == std::vector{LandmarkId(), LandmarkId(1), LandmarkId(3), LandmarkId(5),
+                                          LandmarkId(), LandmarkId(7), LandmarkId(), LandmarkId(9),
+                                          LandmarkId()});
+  CHECK(new_keypoints(keyframe) == std::vector<std::uint32_t>{4, 0, 8});
+  CHECK(keyframe.new_points[2].second == points[2].second);
+  CHECK(keyframe.odometry->keypoints == std::vector<std::uint32_t>{3, 8});
+  CHECK(keyframe.odometry->followed() == 4);
+
+  // The frame that became this keyframe gets its landmarks, each at its own keypoint.
+  LastFrame last(CameraId(2));
+  TrackedFrame tracked;
+  tracked.source = PoseSource::kInitialization;
+  Map map;
+  for (int i = 0; i < 3; ++i) map.add_camera(camera());
+  keyframe.landmarks.assign(9, LandmarkId());
+  keyframe.reference = KeyframeId();
+  keyframe.odometry = nullptr;
+  tracked.keyframe = keyframe;
+  Frame without_landmarks = frame;
+  without_landmarks.landmarks.assign(11, LandmarkId());
+  last.remember(without_landmarks, tracked);
+  const Keyframe& added = map.view().at(map.add_keyframe(keyframe));
+  last.follow(map.view());
+  std::vector<LandmarkId> expected(11);
+  expected[0] = added.landmarks[0];
+  expected[6] = added.landmarks[4];
+  expected[10] = added.landmarks[8];
+  REQUIRE(expected[10].valid());
+  CHECK(last.frame().landmarks == expected);
 }
 
 TEST_CASE("Landmarks that others have seen, too, are well-founded; in a young map all are") {
