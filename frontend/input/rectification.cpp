@@ -118,6 +118,10 @@ StereoRectifier::StereoRectifier(const RawCamera& left, const RawCamera& right,
                                  const Rigid3d& right_from_left, const std::string& source)
     : right_size_(right.size) {
   const Eigen::Vector3d translation = right_from_left.translation();
+  // What is made of a length has its square, which must be neither 0 nor infinite.
+  if (!std::isnormal(translation.squaredNorm())) {
+    throw InputError(source + ": the baseline is zero, or too small or large to be a length");
+  }
   // Otherwise the pair stands one above the other, looks apart, or has its cameras exchanged.
   if (!(-translation.x() > 2 * std::hypot(translation.y(), translation.z()))) {
     throw InputError(source + ": the right camera does not stand to the right of the left one");

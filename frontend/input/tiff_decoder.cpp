@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 
+#include "cameras/files/printable.h"
 #include "frontend/input/image_decoders.h"
 
 // TIFF with 8 or 16 bits per sample, grey or RGB, in strips; libtiff undoes compressions.
@@ -23,7 +24,7 @@ thread_local TiffState* current = nullptr;  // libtiff's handlers of errors know
 void on_tiff_error(const char*, const char* format, va_list arguments) {
   char text[200];
   std::vsnprintf(text, sizeof(text), format, arguments);
-  if (current != nullptr && current->reason.empty()) current->reason = text;
+  if (current != nullptr && current->reason.empty()) current->reason = printable(text);
 }
 
 tmsize_t read_tiff(thandle_t handle, void* to, tmsize_t count) {

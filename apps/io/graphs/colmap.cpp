@@ -88,12 +88,13 @@ void add_observations(const ColmapModel& model, const Index<std::uint32_t>& came
 // what the observations bend it by is lost among their noise: 1e-5 rad are 0.01 px at a focal
 // length of 1000 px; when the model is written, the rest of it goes.
 void add_rigs(const ColmapModel& model, FactorGraph& graph) {
-  constexpr double kTurn = 1e-6;   // sigma [rad]
-  constexpr double kShift = 1e-6;  // sigma by the distance of the two
+  constexpr double kTurn = 1e-6;      // sigma [rad]
+  constexpr double kShift = 1e-6;     // sigma by the distance of the two
+  constexpr double kRounding = 1e-9;  // a distance of two at one place
   for (const ColmapRigidPair& pair : rigid_pairs(model)) {
     GraphEdge edge{pair.a, pair.b, pair.a_from_b, Matrix6d::Zero(), false};
     const double distance = pair.a_from_b.translation().norm();
-    const double shift = kShift * (distance > 0 ? distance : 1);
+    const double shift = kShift * (distance > kRounding ? distance : 1);
     edge.information.diagonal() << Eigen::Vector3d::Constant(1 / (shift * shift)),
         Eigen::Vector3d::Constant(1 / (kTurn * kTurn));
     graph.edges.push_back(edge);

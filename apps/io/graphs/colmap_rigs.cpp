@@ -64,10 +64,25 @@ void visit_images(const ColmapFrame& frame, const RigsById& rigs, const ImagesBy
   }
 }
 
+// Products and squares of lengths beyond this are soon infinite.
+constexpr double kFarthest = 1e100;
+
+bool is_too_far(const Rigid3d& pose) {
+  return pose.translation().lpNorm<Eigen::Infinity>() > kFarthest;
+}
+
 }  // namespace
 
 void check_rigs(const ColmapModel& model) {
   const RigsById rigs = rigs_by_id(model);
+  for (const ColmapRig& rig : model.rigs) {
+    for (const ColmapRigSensor& other : rig.others) {
+      if (other.sensor_from_rig && is_too_far(*other.sensor_from_rig)) {
+        throw model.error("rigs", rig.place,
+                          fmt::format("sensor {} is too far away to be on a rig", other.sensor.id));
+      }
+    }
+  }
   std::unordered_set<std::uint32_t> frames;
   std::unordered_set<std::uint64_t> images;
   for (const ColmapFrame& frame : model.frames) {
@@ -79,6 +94,7 @@ void check_rigs(const ColmapModel& model) {
     }
     const auto rig = rigs.find(frame.rig);
     if (rig == rigs.end()) fail(fmt::format("there is no rig {}", frame.rig));
+    if (is_too_far(frame.rig_from_world)) fail("the rig is too far away to be somewhere");
     for (const ColmapFrameData& data : frame.data) {
       if (!has_sensor(*rig->second, data.sensor)) {
         fail(fmt::format("rig {} has no sensor {}", frame.rig, data.sensor.id));

@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "cameras/files/printable.h"
 #include "frontend/input/bags/bag.h"
 
 // rosbag2's sqlite3 storage: a table of topics, and one of messages with the serialised bytes.
@@ -21,7 +22,7 @@ class SqliteBag final : public Bag {
     if (!has_table()) open(path, "mode=ro&immutable=1");
     if (!has_table()) accept_cut_file();
     if (!has_table()) {
-      throw InputError(name() + ": no bag of ROS 2: " + sqlite3_errmsg(database_.get()));
+      throw InputError(name() + ": no bag of ROS 2: " + fault());
     }
     list_topics();
     list_messages();
@@ -51,6 +52,9 @@ class SqliteBag final : public Bag {
     if (has_table()) warn("is cut off; what can be read is read");
   }
 
+  // SQLite's words on what went wrong, in which names of the file may stand.
+  std::string fault() const { return printable(sqlite3_errmsg(database_.get())); }
+
   Statement prepare(const char* sql) const {
     sqlite3_stmt* statement = nullptr;
     sqlite3_prepare_v2(database_.get(), sql, -1, &statement, nullptr);
@@ -66,7 +70,7 @@ class SqliteBag final : public Bag {
 
   void list_topics() {
     const Statement rows = prepare("SELECT id, name, type, serialization_format FROM topics");
-    if (!rows) throw InputError(name() + ": no bag of ROS 2: " + sqlite3_errmsg(database_.get()));
+    if (!rows) throw InputError(name() + ": no bag of ROS 2: " + fault());
     const auto text = [&](int column) {
       const auto* const value = sqlite3_column_text(rows.get(), column);
       return value ? std::string(reinterpret_cast<const char*>(value)) : std::string();
@@ -77,13 +81,13 @@ class SqliteBag final : public Bag {
           text(1), text(2), text(3) == "cdr" ? Serialization::kCdr : Serialization::kOther);
     }
     if (result != SQLITE_DONE) {
-      throw InputError(name() + ": " + sqlite3_errmsg(database_.get()));
+      throw InputError(name() + ": " + fault());
     }
   }
 
   void list_messages() {
     const Statement rows = prepare("SELECT id, topic_id FROM messages ORDER BY id");
-    if (!rows) throw InputError(name() + ": no bag of ROS 2: " + sqlite3_errmsg(database_.get()));
+    if (!rows) throw InputError(name() + ": no bag of ROS 2: " + fault());
     int result = SQLITE_ROW;
     while ((result = sqlite3_step(rows.get())) == SQLITE_ROW) {
       const auto found = topic_ids_.find(sqlite3_column_int64(rows.get(), 1));
@@ -93,8 +97,7 @@ class SqliteBag final : public Bag {
       if (is_wanted(found->second)) add_message({found->second, 0, id});
     }
     if (result != SQLITE_DONE) {
-      warn(std::string("is cut off or damaged (") + sqlite3_errmsg(database_.get()) +
-           "); what can be read is read");
+      warn("is cut off or damaged (" + fault() + "); what can be read is read");
     }
   }
 

@@ -202,6 +202,23 @@ TEST_CASE("COLMAP: images that a rig joins stay rigid, and frames rule over imag
   CHECK(stale.graph.frames[2].cam_from_world.translation() == Eigen::Vector3d(-0.5, 0.25, 2.125));
 }
 
+TEST_CASE("COLMAP: sensors of a rig that are apart by rounding alone are at one place") {
+  const TempFolder folder;
+  const auto information = [&](const std::string& distance) {
+    TextFiles files = with_rigs();
+    files["rigs.txt"] = "1 2 CAMERA 4 CAMERA 2 1 1 0 0 0 " + distance + " 0 0\n";
+    files["frames.txt"] = "1 1 1 0 0 0 0 0 0 2 CAMERA 4 12 CAMERA 2 6\n";
+    write_files(folder.path() / distance, files);
+    const GraphFile file = read_graph(folder.path() / distance);
+    CHECK(file.graph.validate() == "");
+    return file.graph.edges.at(0).information;
+  };
+  const Matrix6d at_one_place = information("0");
+  CHECK(information("1e-17") == at_one_place);
+  CHECK(information("1e-160") == at_one_place);
+  CHECK(information("0.5")(0, 0) == Approx(4 * at_one_place(0, 0)));
+}
+
 TEST_CASE("COLMAP: a stale model of the cases is the consistent one") {
   const auto cases = shared_cases("colmap");
   if (!cases) return;
@@ -265,17 +282,21 @@ TEST_CASE("COLMAP text: what is refused") {
        {"another's", "12 0 6 0", "12 2 6 0", ":2: the track of point 80 names point 2 of image 12"},
        {"half an element", "12 0 6 0 7 0 8 0", "12 0 6 0 7 0 8", ":2: point index of the track"}});
   const TextFiles files = with_rigs();
-  check_faults(files, "rigs.txt", "",
-               {{"the same id", "10 1", "40 1", ":2: rig 40 is there already"},
-                {"another sensor", "CAMERA 7", "RADAR 7", ":4: sensor type \"RADAR\" is neither"},
-                {"an absurd count", "70 1", "70 4000000000", ":4: sensor's type is missing"},
-                {"a rig missing", "70 1 CAMERA 7\n", "", "frames.txt:4: there is no rig 70"}});
-  check_faults(files, "frames.txt", "",
-               {{"the same id", "2 10 0.8", "1 10 0.8", ":2: frame 1 is there already"},
-                {"a sensor of another rig", "CAMERA 1 5", "CAMERA 2 5", ":2: rig 10 has no sensor"},
-                {"the same image", "CAMERA 1 5", "CAMERA 1 12", ":2: image 12 is in another"},
-                {"an absurd count", "1 CAMERA 4 12", "4000000000 CAMERA 4 12",
-                 ":1: sensor's type is missing"}});
+  check_faults(
+      files, "rigs.txt", "",
+      {{"the same id", "10 1", "40 1", ":2: rig 40 is there already"},
+       {"another sensor", "CAMERA 7", "RADAR 7", ":4: sensor type \"RADAR\" is neither"},
+       {"an absurd count", "70 1", "70 4000000000", ":4: sensor's type is missing"},
+       {"a rig missing", "70 1 CAMERA 7\n", "", "frames.txt:4: there is no rig 70"},
+       {"a length beyond all", "0 0.5 0 0", "0 1e200 0 0", ":5: sensor 3 is too far away"}});
+  check_faults(
+      files, "frames.txt", "",
+      {{"the same id", "2 10 0.8", "1 10 0.8", ":2: frame 1 is there already"},
+       {"a sensor of another rig", "CAMERA 1 5", "CAMERA 2 5", ":2: rig 10 has no sensor"},
+       {"the same image", "CAMERA 1 5", "CAMERA 1 12", ":2: image 12 is in another"},
+       {"a length beyond all", "0 1 2 3 1", "0 1 2 -1e200 1", ":2: the rig is too far away"},
+       {"an absurd count", "1 CAMERA 4 12", "4000000000 CAMERA 4 12",
+        ":1: sensor's type is missing"}});
 }
 
 TEST_CASE("COLMAP binary: any truncation, any trailing byte and any absurd count is refused") {

@@ -3,7 +3,9 @@
 #include <png.h>
 #include <zlib.h>
 
+#include <array>
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <opencv2/imgproc.hpp>
@@ -218,6 +220,32 @@ TEST_CASE("TIFF, PGM and BMP that are cut anywhere are refused") {
       CHECK((!line.empty() || holds(image, picture)));
     }
   }
+}
+
+// A number as it lies in a file of little endian.
+template <typename T>
+std::string bytes_of(T value) {
+  return {reinterpret_cast<const char*>(&value), sizeof(value)};
+}
+
+TEST_CASE("what libtiff says of a damaged file in two lines is one") {
+  const TempFolder folder;
+  // Tag, type (2: text, 3: 16 bits, 4: 32 bits), count, value: RGB, but one name of an ink.
+  const std::array<std::uint32_t, 4> tags[] = {
+      {256, 3, 1, 8},    {257, 3, 1, 6}, {258, 3, 1, 8}, {259, 3, 1, 1},   {262, 3, 1, 2},
+      {273, 4, 1, 9000}, {277, 3, 1, 3}, {278, 3, 1, 6}, {279, 4, 1, 144}, {333, 2, 2, 'A'}};
+  std::string file = "II*" + std::string(1, '\0') + bytes_of<std::uint32_t>(8) +
+                     bytes_of(static_cast<std::uint16_t>(std::size(tags)));
+  for (const auto& [tag, type, count, value] : tags) {
+    file += bytes_of(static_cast<std::uint16_t>(tag)) + bytes_of(static_cast<std::uint16_t>(type)) +
+            bytes_of(count) + bytes_of(value);
+  }
+  write_text(folder.path() / "a.tif", file + bytes_of<std::uint32_t>(0));
+  const std::string line = complaint([&] {
+    read_gray_image(folder.path() / "a.tif", ImageSize{8, 6});
+  });
+  CHECK(line.find("NumberOfInks") != std::string::npos);
+  CHECK(line.find('\n') == std::string::npos);
 }
 
 TEST_CASE("a file truncated at any length is refused") {

@@ -359,6 +359,13 @@ TEST_CASE("what a bag lacks is told in one line") {
         std::string::npos);
   CHECK(with_info([](CameraInfoMessage& i) { i.p[3] = 0; }).find("P has no baseline") !=
         std::string::npos);
+  // Raw images, whose pair is 1e-200 m or 1e200 m wide.
+  for (const double scale : {1e-200, 1e200}) {
+    CHECK(with_info([&](CameraInfoMessage& i) {
+            i.d[0] = 0.05;
+            i.p[3] *= scale;
+          }).ends_with("the baseline is zero, or too small or large to be a length"));
+  }
   CHECK(with_info([](CameraInfoMessage& i) { i.binning_x = 2; }).find("binning") !=
         std::string::npos);
   CHECK(with_info([](CameraInfoMessage& i) {

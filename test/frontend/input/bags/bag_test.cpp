@@ -1,3 +1,5 @@
+#include <sqlite3.h>
+
 #include <catch2/catch.hpp>
 
 #include "frontend/input/bags/bag.h"
@@ -121,6 +123,20 @@ TEST_CASE("of a sqlite bag that was cut off, what can be read is read") {
   }
   CHECK(good >= 3);
   CHECK(bad + bag->warnings().size() > 0);
+}
+
+TEST_CASE("what SQLite says of a damaged bag in two lines is one") {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "a.db3";
+  sqlite3* database = nullptr;
+  REQUIRE(sqlite3_open(path.c_str(), &database) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(database,
+                       "CREATE TABLE messages(id);"
+                       "CREATE VIEW topics AS SELECT * FROM \"two\nlines\"",
+                       nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(database);
+  CHECK(complaint([&] { open_bag(path); }) ==
+        path.string() + ": no bag of ROS 2: no such table: main.two?lines");
 }
 
 TEST_CASE("messages that were compressed by themselves are decompressed") {
