@@ -83,7 +83,8 @@ FrameTracking::FrameTracking(const CameraRig& cameras, const SlamOptions& option
       localize_(localize),
       first_index_(next_frame_index(mapping.map().view())),
       diagnosis_(options.features, cameras.fisheye.has_value()),
-      stereo_floor_(mapping.camera_id(cameras.stereo)) {
+      stereo_floor_(mapping.camera_id(cameras.stereo)),
+      lamps_(cameras.fisheye.has_value()) {
   rig_.rows = RowField(cameras.stereo.width, cameras.stereo.height);
   if (localize_ && !mapping.map().view().origin().valid()) {
     throw std::logic_error("FrameTracking: nothing to localise in");
@@ -112,6 +113,7 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
   learn_calibration(frame);
   follow_calibration(frame, map);
   TrackedFrame tracked = track_by_camera(frame, map, allow_keyframe && !localize_);
+  doubt_lamps(frame.camera, map, tracked);
   if (!localize_) counts_.add(tracked.counts);  // else no keyframe would take them
   result.index = tracked.frame_index;
   result.state = state_of(tracked, map);
@@ -176,6 +178,15 @@ std::optional<UncertainMotion> FrameTracking::left_from_fisheye(const MapSnapsho
     return std::nullopt;
   }
   return relative_pose(map, *left, *fisheye);
+}
+
+// What the lamps pretend is the stereo pair's to know: the map, on which the fisheye rests, is
+// made of its images.
+void FrameTracking::doubt_lamps(CameraKind camera, const MapSnapshot& map, TrackedFrame& tracked) {
+  const Eigen::Vector3d place = inverse(tracked.cam_from_world).translation();
+  if (tracked.tracked() && camera == CameraKind::kStereo) lamps_.vehicle_at(place);
+  if (tracked.tracked() && camera == CameraKind::kFisheye) lamps_.arm_at(place);
+  lamps_.widen(map, stereo_.shading_doubt(), tracked);
 }
 
 TrackedFrame FrameTracking::track_by_camera(CameraFrame& frame, const MapSnapshot& map,

@@ -9,6 +9,7 @@
 #include "frontend/calibration/rig_calibrator.h"
 #include "frontend/place_recognition/keyframe_database.h"
 #include "frontend/tracking/fisheye_tracker.h"
+#include "frontend/tracking/lamp_doubt.h"
 #include "frontend/tracking/stereo_tracker.h"
 
 namespace hybrid_slam {
@@ -36,6 +37,7 @@ class FrameTracking {
   void follow_calibration(CameraFrame& frame, const MapSnapshot& map);
   void learn_calibration(const CameraFrame& frame);
   std::shared_ptr<const RigFindings> findings(const TrackedFrame& tracked);
+  void doubt_lamps(CameraKind camera, const MapSnapshot& map, TrackedFrame& tracked);
   TrackedFrame track_by_camera(CameraFrame& frame, const MapSnapshot& map, bool allow_keyframe);
 
   std::shared_ptr<KeyframeDatabase> places_;
@@ -51,6 +53,7 @@ class FrameTracking {
   FloorFinder stereo_floor_;
   std::optional<FloorFinder> fisheye_floor_;
   RigFindings rig_;
+  LampDoubt lamps_;
 };
 
 }  // namespace hybrid_slam

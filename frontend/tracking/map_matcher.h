@@ -120,6 +120,7 @@ class MapMatcher {
 
   // See TrackRefiner.
   double shading() const { return refiner_.shading(); }
+  ShadingDoubt shading_doubt() const { return refiner_.shading_doubt(); }
 
  private:
   PoseSupport refine_with(const PoseRefinementOptions& options, const MapSnapshot& map,

@@ -138,6 +138,12 @@ void ShadingCalibrator::add(const std::vector<ShadedTrack>& tracks, double corre
   estimate_.add(corrected + fit.parameters.z(), fit.information);
 }
 
+ShadingDoubt ShadingCalibrator::doubt(double size) const {
+  if (!options_.enabled) return {};
+  return {.of_vehicle = relative_depth(sigma(), size),
+          .of_arm = relative_depth(std::hypot(depth_per_size(), sigma()), size)};
+}
+
 double ShadingCalibrator::relative_depth(double depth_per_size, double size) {
   return depth_per_size * kReferenceSize * std::pow(size / kReferenceSize, kReliefExponent);
 }

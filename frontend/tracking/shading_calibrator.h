@@ -36,6 +36,13 @@ ShadedTrack make_shaded_track(const Calibrated<RectifiedStereo>& camera,
                               const Rigid3d& now_from_first, const Keypoint& first, double u_right,
                               const Keypoint& now, double depth);
 
+// How much of a lamp's way a pose may be off by, one standard deviation: of the vehicle's lamps,
+// whose share was estimated and removed, and of one on an arm, whose share was not.
+struct ShadingDoubt {
+  double of_vehicle = 0;
+  double of_arm = 0;
+};
+
 // Lamps that move along with the cameras shade bumps anew from every place: what is seen of a bump
 // follows the lamp, and moves less through the images than the ground does. It moves as if it lay
 // deeper, by its "shading depth". A stereo pair sees both its images by the same light and is not
@@ -60,6 +67,9 @@ class ShadingCalibrator {
   // Changes at stated numbers of keyframes alone.
   double depth_per_size() const { return estimate_.in_use(); }
   double sigma() const { return estimate_.sigma(); }  // standard deviation of the estimate
+
+  // Of a pose that rests on features of about this size [rad]; none where lamps stand still.
+  ShadingDoubt doubt(double size) const;
 
   // Shading depth over depth, of features of `size` [rad].
   static double relative_depth(double depth_per_size, double size);

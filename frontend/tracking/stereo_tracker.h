@@ -70,6 +70,9 @@ class StereoTracker {
 
   const DisparityCalibrator& disparity() const { return disparity_; }
 
+  // See TrackRefiner.
+  ShadingDoubt shading_doubt() const { return matcher_.shading_doubt(); }
+
  private:
   // A frame since the last tracked one, whose place is not known well enough.
   struct Unplaced {

@@ -4,6 +4,10 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
+#include <vector>
+
+#include "frontend/pose/pose_belief.h"
 
 namespace hybrid_slam {
 namespace {
@@ -42,6 +46,15 @@ std::optional<Eigen::Matrix2d> patch_warp(const Camera& camera,
     warp.col(axis) = (ends[1] - ends[0]) / (2 * kStep);
   }
   return warp;
+}
+
+// Median of the aligned keypoints; 0 without any.
+double median_scale(const Frame& frame) {
+  std::vector<double> scales;
+  for (const std::size_t i : frame.aligned) {
+    scales.push_back(double{frame.features.left.keypoints[i].scale});
+  }
+  return median_of(std::move(scales));
 }
 
 }  // namespace
@@ -182,7 +195,9 @@ int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) const {
 }
 
 void TrackRefiner::learn_shading(const MapSnapshot& map, const Frame& frame) {
-  if (focal_ == 0 || !is_news(map, frame)) return;
+  if (focal_ == 0) return;
+  size_ = median_scale(frame) / focal_;
+  if (!is_news(map, frame)) return;
   learnt_at_ = inverse(frame.cam_from_world).translation();
   const auto& stereo = std::get<Calibrated<RectifiedStereo>>(camera_);
   std::vector<ShadedTrack> tracks;
@@ -208,10 +223,9 @@ bool TrackRefiner::is_news(const MapSnapshot& map, const Frame& frame) const {
     depths.push_back((frame.cam_from_world * landmark->point_in_world).z());
   }
   if (depths.empty()) return false;
-  const auto middle = depths.begin() + static_cast<long>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
   const Eigen::Vector3d place = inverse(frame.cam_from_world).translation();
-  return !learnt_at_ || (place - *learnt_at_).norm() >= kLearningStep * *middle;
+  return !learnt_at_ ||
+         (place - *learnt_at_).norm() >= kLearningStep * median_of(std::move(depths));
 }
 
 }  // namespace hybrid_slam

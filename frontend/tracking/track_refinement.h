@@ -57,6 +57,9 @@ class TrackRefiner {
   // In use now; see ShadingCalibrator.
   double shading() const { return shading_.depth_per_size(); }
 
+  // What it leaves open for the last tracked frame; nothing of one without aligned keypoints.
+  ShadingDoubt shading_doubt() const { return shading_.doubt(size_); }
+
  private:
   struct Reference;
 
@@ -73,6 +76,7 @@ class TrackRefiner {
   TrackRefinementOptions options_;
   double focal_ = 0;  // of a stereo pair [px], else 0
   ShadingCalibrator shading_;
+  double size_ = 0;  // median of the last tracked frame's aligned keypoints [rad]
   std::shared_ptr<const NoiseFloor> floor_;
   std::optional<Eigen::Vector3d> learnt_at_;  // where the last frame that was looked at stood
   std::deque<std::pair<std::int64_t, std::shared_ptr<const ImagePyramid>>>

@@ -99,6 +99,22 @@ TEST_CASE("The depth that lamps pretend is found beside other errors") {
   }
 }
 
+TEST_CASE("What is not known of the shading is told as a share of the lamps' ways") {
+  constexpr double kSize = 3e-3;
+  const ShadingDoubt before = ShadingCalibrator({}).doubt(kSize);
+  CHECK(before.of_vehicle == ShadingCalibrator::relative_depth(1, kSize));  // as wide as the prior
+  CHECK(before.of_arm == before.of_vehicle);
+  const ShadingCalibrator calibrator = calibrated({.depth_per_size = 0.4}, 1, 60);
+  REQUIRE(calibrator.depth_per_size() > 0.2);
+  const ShadingDoubt after = calibrator.doubt(kSize);
+  CHECK(after.of_vehicle < 0.1 * before.of_vehicle);
+  CHECK(after.of_arm >= ShadingCalibrator::relative_depth(calibrator.depth_per_size(), kSize));
+  ShadingCalibratorOptions still;
+  still.enabled = false;
+  CHECK(ShadingCalibrator(still).doubt(kSize).of_vehicle == 0);
+  CHECK(ShadingCalibrator(still).doubt(kSize).of_arm == 0);
+}
+
 TEST_CASE("Without moving lamps nothing is corrected") {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const Seafloor ground{.scale_error = 0.003, .offset = -0.15, .wrong = 0.1};

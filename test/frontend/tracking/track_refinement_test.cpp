@@ -167,13 +167,20 @@ TEST_CASE("What moving lamps pretend is learnt from frames apart and taken out")
     refiner.learn_shading(wall.map.view(), frame);
     return frame;
   };
+  CHECK(refiner.shading_doubt().of_vehicle == 0);
   learn();
+  CHECK(refiner.shading_doubt().of_vehicle > 0);
   const double once = refiner.shading();
   for (int i = 0; i < 30; ++i) learn();
   CHECK(refiner.shading() == once);  // it hovers: one frame, thirty times
   for (int i = 0; i < 30; ++i) refiner.learn_shading(wall.map.view(), elsewhere(learn()));
   CHECK(refiner.shading() == Approx(kShading).epsilon(0.15));
   CHECK(error(wall.second) == Approx(0).margin(0.06));
+  Frame features_only = wall.second;
+  features_only.image.reset();
+  refiner.refine(wall.map.view(), features_only);
+  refiner.learn_shading(wall.map.view(), features_only);
+  CHECK(refiner.shading_doubt().of_vehicle == 0);
 }
 
 TEST_CASE("Without the image of a first view nothing moves") {
