@@ -73,6 +73,7 @@ void let_watch(LiveView& view, const RunInput& input, Map& map, ReplayHooks& hoo
     tell(left_out);
     feed.left_out(left_out);
   };
+  hooks.keyframe = [&feed](const KeyframeResult& keyframe) { feed.keyframe(keyframe); };
   hooks.loop = [&feed](const LoopRecord& loop) { feed.loop(loop); };
   hooks.map = [&feed](const std::shared_ptr<const MapSnapshot>& changed, MapChange change) {
     feed.map(changed, change);

@@ -116,7 +116,9 @@ struct ReplayProgress {
 struct ReplayHooks {
   std::function<void(const FrameResult&)> frame;  // of each camera, once it was tracked
   std::function<void(const LeftOut&)> left_out;   // of each camera, if it never will be
-  std::function<void(const LoopRecord&)> loop;    // as SessionObservers tell of them
+  // As SessionObservers tell of them.
+  std::function<void(const KeyframeResult&)> keyframe;
+  std::function<void(const LoopRecord&)> loop;
   std::function<void(const std::shared_ptr<const MapSnapshot>&, MapChange)> map;
   // What is about to be pushed. Called by who reads, while others are called.
   std::function<void(const Moment&)> images;
