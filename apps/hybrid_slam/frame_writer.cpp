@@ -95,8 +95,10 @@ FrameWriter::FrameWriter(const std::filesystem::path& folder, bool fisheye,
                          std::function<void(const std::string&)> warn)
     : warn_(std::move(warn)),
       frames_(folder / "frames.csv"),
+      times_(folder / "timing.csv"),
       stereo_{LineFile(folder / "stereo_online.tum"), LineFile(folder / "stereo.tum")} {
   append(frames_, header());
+  append(times_, "time,cpu_ms,behind_ms");
   if (!fisheye) return;
   fisheye_ = {LineFile(folder / "fisheye_online.tum"), LineFile(folder / "fisheye.tum")};
   fisheye_in_left_ = LineFile(folder / "fisheye_in_left.csv");
@@ -130,6 +132,11 @@ void FrameWriter::left_out(const LeftOut& input) {
   append(frames_, fmt::format("{},{:.9f},,{},,,", to_string(input.camera), to_seconds(input.time),
                               input.reason) +
                       commas(kPoseColumns + 4 + kPoseColumns + 6 + kCovarianceColumns + 2));
+}
+
+void FrameWriter::times(const FrameTimes& times) {
+  append(times_, fmt::format("{:.6f},{:.3f},{}", times.time, times.cpu_ms,
+                             times.behind_ms ? fmt::format("{:.3f}", *times.behind_ms) : ""));
 }
 
 }  // namespace hybrid_slam

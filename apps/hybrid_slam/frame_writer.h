@@ -4,14 +4,15 @@
 #include <functional>
 #include <string>
 
-#include "apps/slam/session_types.h"
+#include "apps/slam/replay.h"
 #include "cameras/files/line_file.h"
 
 namespace hybrid_slam {
 
 // Writes what becomes of each frame as it happens, so that all of it is there if the program is
-// killed: frames.csv, fisheye_in_left.csv, and the trajectories as they were known at each moment
-// (docs/outputs.md). Does not throw once the files are there: what cannot be written is left out.
+// killed: frames.csv, timing.csv, fisheye_in_left.csv, and the trajectories as they were known at
+// each moment (docs/reliability.md). Does not throw once the files are there: what cannot be
+// written is left out.
 class FrameWriter {
  public:
   // `warn` is told once of each file that cannot be written to. Throws OutputError.
@@ -20,6 +21,7 @@ class FrameWriter {
 
   void frame(const FrameResult& frame);
   void left_out(const LeftOut& input);
+  void times(const FrameTimes& times);
 
  private:
   struct Trajectory {
@@ -31,6 +33,7 @@ class FrameWriter {
 
   std::function<void(const std::string&)> warn_;
   LineFile frames_;
+  LineFile times_;
   LineFile fisheye_in_left_;
   Trajectory stereo_;
   Trajectory fisheye_;

@@ -161,14 +161,19 @@ class LiveInput final : public RunInput {
   // How the recording is replayed; empty: there is none.
   std::string replay_command() const {
     if (!recorder_) return {};
-    const std::string& folder = line_.record;
-    std::string command = fmt::format("hybrid_slam --left {0}/left --right {0}/right", folder);
-    if (cameras_.info.fisheye) command += fmt::format(" --fisheye {}/fisheye", folder);
+    const fs::path folder = line_.record;
+    std::string command = "hybrid_slam";
+    const auto add = [&](const std::string& option, const fs::path& path) {
+      command += " " + option + " " + shell_word(path.string());
+    };
+    add("--left", folder / "left");
+    add("--right", folder / "right");
+    if (cameras_.info.fisheye) add("--fisheye", folder / "fisheye");
     command += " --calibration";
-    for (const std::string& file : recorder_->calibration()) command += " " + file;
-    command += " --config " + options_of(folder).string();
-    if (!line_.run.map.empty()) command += " --map " + line_.run.map;
-    if (!line_.run.vocabulary.empty()) command += " --vocabulary " + line_.run.vocabulary;
+    for (const std::string& file : recorder_->calibration()) command += " " + shell_word(file);
+    add("--config", options_of(folder));
+    if (!line_.run.map.empty()) add("--map", line_.run.map);
+    if (!line_.run.vocabulary.empty()) add("--vocabulary", line_.run.vocabulary);
     if (line_.run.localize) command += " --localize";
     return command +
            (cameras_.images == FootageImages::kRaw ? " --images raw" : " --images rectified");

@@ -21,23 +21,14 @@
 namespace hybrid_slam {
 namespace {
 
-struct Trajectories {
-  Trajectory final_estimate;
-  Trajectory online;
-};
-
-Trajectories collect(const RunResult& result, const std::vector<FrameRecord>& records) {
-  Trajectories trajectories;
+// Of the component that holds most of the frames, as the map has them at the end.
+Trajectory collect(const RunResult& result, const std::vector<FrameRecord>& records) {
+  Trajectory trajectory;
   for (const FrameRecord& record : records) {
-    if (record.frame.tracked()) {
-      if (record.in_main) {
-        trajectories.final_estimate.push_back(
-            {record.frame.time, inverse(result.cam_from_world(record))});
-      }
-      trajectories.online.push_back({record.frame.time, inverse(record.frame.cam_from_world)});
-    }
+    if (!record.frame.tracked() || !record.in_main) continue;
+    trajectory.push_back({record.frame.time, inverse(result.cam_from_world(record))});
   }
-  return trajectories;
+  return trajectory;
 }
 
 // A quarter of the shortest time between two frames [s].
@@ -104,15 +95,6 @@ MapPicture make_picture(const SequenceInfo& sequence, const RunResult& result,
   return picture;
 }
 
-void write_frame_times(const std::filesystem::path& path, const std::vector<FrameRecord>& records) {
-  std::string text = "time,cpu_ms,behind_ms\n";
-  for (const FrameRecord& record : records) {
-    text += fmt::format("{:.6f},{:.3f},{}\n", record.frame.time, record.cpu_ms,
-                        record.behind_ms ? fmt::format("{:.3f}", *record.behind_ms) : "");
-  }
-  write_file(path, text);
-}
-
 // Read from the files that are there already; empty if one of them was cut off.
 RunStory story_of(const std::filesystem::path& out, const MapSnapshot& map) {
   try {
@@ -176,28 +158,21 @@ RunSummary write_outputs(const CommandLine& line, RunInput& input, const RunResu
                          double seconds) {
   const SequenceInfo& sequence = input.info();
   const std::filesystem::path out = line.out;
-  const Trajectories stereo = collect(result, result.records);
-  const Trajectories fisheye = collect(result, result.fisheye_records);
+  const Trajectory stereo = collect(result, result.records);
+  const Trajectory fisheye = collect(result, result.fisheye_records);
   RunSummary summary;
   summary.seconds = seconds;
-  summary.ate = evaluate(sequence, stereo.final_estimate);
-  summary.hybrid = evaluate_hybrid(sequence, result, stereo.final_estimate, fisheye.final_estimate);
-  write_tum(out / "stereo.tum", stereo.final_estimate);
-  write_tum(out / "stereo_online.tum", stereo.online);
-  if (sequence.fisheye) {
-    write_tum(out / "fisheye.tum", fisheye.final_estimate);
-    write_tum(out / "fisheye_online.tum", fisheye.online);
-  }
+  summary.ate = evaluate(sequence, stereo);
+  summary.hybrid = evaluate_hybrid(sequence, result, stereo, fisheye);
+  write_tum(out / "stereo.tum", stereo);
+  if (sequence.fisheye) write_tum(out / "fisheye.tum", fisheye);
   write_map_ply(out / "map.ply", *result.map);
-  write_map_picture(out / "map.png", make_picture(sequence, result, stereo.final_estimate,
-                                                  fisheye.final_estimate, summary.ate));
+  write_map_picture(out / "map.png", make_picture(sequence, result, stereo, fisheye, summary.ate));
   write_loops(out / "loops.csv", result.loops);
   write_json(out / "timing.json", to_json(result.times));
-  write_frame_times(out / "timing.csv", result.records);
   std::vector<ErrorsOfCamera> compared;
   if (summary.ate) {
-    compared = {{"stereo", stereo.final_estimate, sequence.truth},
-                {"fisheye", fisheye.final_estimate, sequence.fisheye_truth}};
+    compared = {{"stereo", stereo, sequence.truth}, {"fisheye", fisheye, sequence.fisheye_truth}};
   }
   write_errors(out / "errors.csv", compared,
                summary.ate ? summary.ate->truth_from_estimate : Sim3d(), max_difference(sequence));

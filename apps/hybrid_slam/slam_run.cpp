@@ -73,6 +73,7 @@ void let_watch(LiveView& view, const RunInput& input, Map& map, ReplayHooks& hoo
     tell(left_out);
     feed.left_out(left_out);
   };
+  hooks.keyframe = [&feed](const KeyframeResult& keyframe) { feed.keyframe(keyframe); };
   hooks.loop = [&feed](const LoopRecord& loop) { feed.loop(loop); };
   hooks.map = [&feed](const std::shared_ptr<const MapSnapshot>& changed, MapChange change) {
     feed.map(changed, change);
@@ -112,6 +113,7 @@ PreparedRun prepare_run(const CommandLine& line) {
   session.threads = line.threads;
   session.device = line.device;
   session.localize = line.localize;
+  session.history = 0;  // nobody asks for poses
   session.checkpoint_every = line.checkpoint_every;
   session.checkpoint = [&line](const MapSnapshot& so_far, const MapFileInfo& info) {
     return checkpoint(line, so_far, info);
@@ -141,6 +143,7 @@ int run_slam(const CommandLine& line, PreparedRun prepared, RunInput& input,
   FrameWriter writer(line.out, input.info().fisheye.has_value(), hooks.warning);
   hooks.frame = [&](const FrameResult& frame) { writer.frame(frame); };
   hooks.left_out = [&](const LeftOut& left_out) { writer.left_out(left_out); };
+  hooks.times = [&](const FrameTimes& times) { writer.times(times); };
   hooks.cancelled = cancelled;
   if (prepared.view) {
     let_watch(*prepared.view, input, prepared.map, hooks);

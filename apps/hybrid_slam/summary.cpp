@@ -107,9 +107,8 @@ Json summary_json(const CommandLine& line, const RunInput& input, const RunResul
   json["components"] = result.components;
   json["loops"] = to_json(result.loops);
   if (sequence.fisheye) json["fisheye"] = fisheye_json(result, summary);
-  json["disparity_offset_px"] =
-      result.records.empty() ? 0 : result.records.back().frame.disparity_offset;
-  json["shading_depth_per_size"] = result.records.empty() ? 0 : result.records.back().frame.shading;
+  json["disparity_offset_px"] = result.disparity_offset;
+  json["shading_depth_per_size"] = result.shading;
   json["interrupted"] = result.cancelled;
   json["internal_errors"] = result.internal_errors;
   json["seconds"] = summary.seconds;

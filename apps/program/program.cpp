@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
+#include <string_view>
 
 #include "apps/slam/version.h"
 #include "cameras/files/input_error.h"
@@ -62,5 +63,17 @@ void watch_signals() {
 }
 
 bool interrupted() { return signalled; }
+
+std::string shell_word(const std::string& word) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+:,@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char letter : word) {
+    if (letter == '\'') quoted += "'\\'";  // ends the quotes, is quoted itself, begins new ones
+    quoted += letter;
+  }
+  return quoted + "'";
+}
 
 }  // namespace hybrid_slam

@@ -9,7 +9,7 @@ class App;
 }
 
 // What every program does alike: its exit codes, its one line per error, its command line's end,
-// --version, the first Ctrl-C.
+// --version, the first Ctrl-C, commands that it prints.
 
 namespace hybrid_slam {
 
@@ -37,5 +37,8 @@ std::optional<int> parse_line(CLI::App& app, int argc, char** argv,
 // watch_signals() ends the run in order, a second one kills the program as usual.
 void watch_signals();
 bool interrupted();
+
+// As a shell (POSIX) takes it for one word of a command: in quotes where it needs them.
+std::string shell_word(const std::string& word);
 
 }  // namespace hybrid_slam

@@ -40,6 +40,10 @@ void PythonSession::drain() {
     Event event = *events_.pop();
     if (auto* frame = std::get_if<FrameResult>(&event)) {
       recorder_.tracked(*frame);
+      if (frame->has_pose()) {
+        online_[static_cast<std::size_t>(frame->camera)].poses.push_back(
+            {frame->tracked.time, inverse(frame->tracked.cam_from_world)});
+      }
       if (unread_.size() == kKept) unread_.pop_front();
       unread_.push_back(std::move(*frame));
     } else if (const auto* keyframe = std::get_if<KeyframeResult>(&event)) {
@@ -87,18 +91,15 @@ std::vector<std::string> PythonSession::failures() {
 
 Path PythonSession::trajectory(CameraKind camera, bool online) {
   drain();
+  if (online) return online_[static_cast<std::size_t>(camera)];
   RunResult result = result_;
   result.map = session_->map();
   settle_components(result);
   Path path;
   for (const FrameRecord& record :
        camera == CameraKind::kStereo ? result.records : result.fisheye_records) {
-    if (!record.frame.tracked()) continue;
-    if (online) {
-      path.poses.push_back({record.frame.time, inverse(record.frame.cam_from_world)});
-    } else if (record.in_main) {
-      path.poses.push_back({record.frame.time, inverse(result.cam_from_world(record))});
-    }
+    if (!record.frame.tracked() || !record.in_main) continue;
+    path.poses.push_back({record.frame.time, inverse(result.cam_from_world(record))});
   }
   return path;
 }

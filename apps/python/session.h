@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <deque>
 #include <limits>
 #include <memory>
@@ -45,6 +46,7 @@ class PythonSession {
   Channel<Event> events_{std::numeric_limits<std::size_t>::max()};
   ReplayHooks hooks_;
   RunResult result_;
+  std::array<Path, 2> online_;  // as each frame was when it was tracked; by camera
   Recorder recorder_{result_, hooks_, 0};
   std::deque<FrameResult> unread_;
   std::vector<std::string> failures_;

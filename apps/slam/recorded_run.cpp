@@ -14,7 +14,10 @@ SessionObservers observers_of(Recorder& recorder, const ReplayHooks& hooks) {
   SessionObservers observers;
   observers.map = hooks.map;
   observers.frame = [&](const FrameResult& frame) { recorder.tracked(frame); };
-  observers.keyframe = [&](const KeyframeResult& keyframe) { recorder.became_keyframe(keyframe); };
+  observers.keyframe = [&recorder, &hooks](const KeyframeResult& keyframe) {
+    recorder.became_keyframe(keyframe);
+    if (hooks.keyframe) hooks.keyframe(keyframe);
+  };
   observers.loop = [&recorder, &hooks](const LoopRecord& loop) {
     recorder.looped(loop);
     if (hooks.loop) hooks.loop(loop);

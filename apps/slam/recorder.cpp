@@ -2,7 +2,9 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace hybrid_slam {
 namespace {
@@ -10,15 +12,8 @@ namespace {
 constexpr const char* kCorrupt = "corrupt";
 
 RecordedFrame recorded(const TrackedFrame& frame) {
-  return {frame.frame_index,
-          frame.time,
-          frame.source,
-          frame.prediction,
-          frame.cam_from_world,
-          frame.reference,
-          frame.cam_from_reference,
-          frame.disparity_offset,
-          frame.shading};
+  return {frame.frame_index, frame.time,   frame.cam_from_reference,
+          frame.reference,   frame.source, frame.prediction};
 }
 
 double process_cpu_ms() {
@@ -93,8 +88,7 @@ void Recorder::tracked(const FrameResult& frame) {
   auto& records = stereo ? result_.records : result_.fisheye_records;
   ++counts.read;
   ++(frame.has_pose() ? counts.tracked : frame.tracked.coasted() ? counts.coasted : counts.lost);
-  record_of_frame_[{frame.camera, frame.index}] = records.size();
-  records.push_back({recorded(frame.tracked), std::nullopt, 0});
+  records.push_back({recorded(frame.tracked), std::nullopt});
   FrameConditions& conditions = stereo ? result_.conditions : result_.fisheye_conditions;
   ++conditions.states[to_string(frame.state)];
   for (const FoundCause& found : frame.causes) ++conditions.causes[to_string(found.cause)];
@@ -103,8 +97,9 @@ void Recorder::tracked(const FrameResult& frame) {
   progress_.keyframes = frame.keyframes;
   progress_.landmarks = frame.landmarks;
   if (!stereo) return;
-  add_cpu_time();
-  add_time_behind(frame.time);
+  result_.disparity_offset = frame.tracked.disparity_offset;
+  result_.shading = frame.tracked.shading;
+  begin_times(frame);
   report();
 }
 
@@ -112,8 +107,10 @@ void Recorder::became_keyframe(const KeyframeResult& keyframe) {
   const std::lock_guard lock(mutex_);
   auto& records =
       keyframe.camera == CameraKind::kStereo ? result_.records : result_.fisheye_records;
-  const auto record = record_of_frame_.find({keyframe.camera, keyframe.index});
-  if (record != record_of_frame_.end()) records[record->second].keyframe = keyframe.id;
+  const auto record = std::find_if(records.rbegin(), records.rend(), [&](const FrameRecord& one) {
+    return one.frame.frame_index == keyframe.index;
+  });
+  if (record != records.rend()) record->keyframe = keyframe.id;
 }
 
 void Recorder::looped(const LoopRecord& loop) {
@@ -121,20 +118,33 @@ void Recorder::looped(const LoopRecord& loop) {
   result_.loops.push_back(loop);
 }
 
-void Recorder::add_cpu_time() {
+// Those of the frame before are complete.
+void Recorder::begin_times(const FrameResult& frame) {
+  const double cpu_ms = cpu_time_since();
+  if (times_ && hooks_.times) hooks_.times(*times_);
+  times_ = FrameTimes{frame.tracked.time, cpu_ms, time_behind(frame.time)};
+}
+
+void Recorder::end_times() {
+  if (!times_) return;
+  times_->cpu_ms += cpu_time_since();
+  if (hooks_.times) hooks_.times(*times_);
+  times_.reset();
+}
+
+double Recorder::cpu_time_since() {
   const double now = process_cpu_ms();
-  result_.records.back().cpu_ms += now - cpu_ms_;
-  cpu_ms_ = now;
+  return now - std::exchange(cpu_ms_, now);
 }
 
 // Those before it were left out.
-void Recorder::add_time_behind(Nanoseconds time) {
+std::optional<double> Recorder::time_behind(Nanoseconds time) {
   const auto found = due_.find(time);
-  if (found == due_.end()) return;
+  if (found == due_.end()) return std::nullopt;
   const std::chrono::duration<double, std::milli> behind =
       std::chrono::steady_clock::now() - found->second;
-  result_.records.back().behind_ms = behind.count();
   due_.erase(due_.begin(), std::next(found));
+  return behind.count();
 }
 
 void Recorder::finish(const SessionCounts& counts, bool cancelled) {
@@ -146,7 +156,7 @@ void Recorder::finish(const SessionCounts& counts, bool cancelled) {
     warn(std::to_string(counts.overruns) +
          " events came too fast to be recorded: frames are missing");
   }
-  if (!result_.records.empty()) add_cpu_time();
+  end_times();
 }
 
 void Recorder::report() {

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <chrono>
-#include <cstdint>
 #include <map>
 #include <mutex>
-#include <utility>
+#include <optional>
 
 #include "apps/slam/replay.h"
 
@@ -31,17 +30,19 @@ class Recorder {
  private:
   void warn(const std::string& text);
   void report();
-  void add_cpu_time();
-  void add_time_behind(Nanoseconds time);
+  void begin_times(const FrameResult& frame);
+  void end_times();
+  double cpu_time_since();
+  std::optional<double> time_behind(Nanoseconds time);
   void tell_left_out(const LeftOut& input);
 
   RunResult& result_;
   const ReplayHooks& hooks_;
   ReplayProgress progress_;
-  double cpu_ms_;  // that the process had used when the last frame was done
+  double cpu_ms_;                    // that the process had used when the last frame was done
+  std::optional<FrameTimes> times_;  // of the newest stereo frame
   std::map<Nanoseconds, std::chrono::steady_clock::time_point> due_;  // of pairs not yet tracked
-  std::map<std::pair<CameraKind, std::int64_t>, std::size_t> record_of_frame_;
-  std::mutex mutex_;  // guards all of it
+  std::mutex mutex_;                                                  // guards all of it
 };
 
 }  // namespace hybrid_slam

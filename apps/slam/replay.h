@@ -74,17 +74,14 @@ struct FrameCounts {
   int corrupt = 0;
 };
 
-// What of a TrackedFrame is needed after the run.
+// What of a TrackedFrame is needed after the run; it stays small, as a run may last for days.
 struct RecordedFrame {
   std::int64_t frame_index = 0;
   double time = 0;  // [s]
+  Rigid3d cam_from_reference;
+  KeyframeId reference;
   PoseSource source = PoseSource::kNone;
   Prediction prediction = Prediction::kNone;
-  Rigid3d cam_from_world;
-  KeyframeId reference;
-  Rigid3d cam_from_reference;
-  double disparity_offset = 0;
-  double shading = 0;
 
   bool tracked() const { return source != PoseSource::kNone && source != PoseSource::kCoasted; }
 };
@@ -93,13 +90,18 @@ struct RecordedFrame {
 struct FrameRecord {
   RecordedFrame frame;
   std::optional<KeyframeId> keyframe;  // the keyframe it became
-  // Of a stereo frame: of the whole process, all its threads, from when the stereo frame before was
-  // tracked [ms]. The first one's has the start of the run, the last one's the end.
-  double cpu_ms = 0;
-  // Of a stereo frame, where somebody's clock gives the images (realtime at a rate, cameras): how
-  // long after they were due it was tracked [ms]. None otherwise.
-  std::optional<double> behind_ms{};
   bool in_main = true;  // it has a pose in the component that holds most of the frames at the end
+};
+
+// What a stereo frame took.
+struct FrameTimes {
+  double time = 0;  // of the frame [s]
+  // Of the whole process, all its threads, from when the stereo frame before was tracked [ms]. The
+  // first one's has the start of the run, the last one's the end.
+  double cpu_ms = 0;
+  // Where somebody's clock gives the images (realtime at a rate, cameras): how long after they were
+  // due it was tracked [ms]. None otherwise.
+  std::optional<double> behind_ms{};
 };
 
 struct ReplayProgress {
@@ -116,7 +118,11 @@ struct ReplayProgress {
 struct ReplayHooks {
   std::function<void(const FrameResult&)> frame;  // of each camera, once it was tracked
   std::function<void(const LeftOut&)> left_out;   // of each camera, if it never will be
-  std::function<void(const LoopRecord&)> loop;    // as SessionObservers tell of them
+  // Of each stereo frame, when the next one was tracked, or none comes any more.
+  std::function<void(const FrameTimes&)> times;
+  // As SessionObservers tell of them.
+  std::function<void(const KeyframeResult&)> keyframe;
+  std::function<void(const LoopRecord&)> loop;
   std::function<void(const std::shared_ptr<const MapSnapshot>&, MapChange)> map;
   // What is about to be pushed. Called by who reads, while others are called.
   std::function<void(const Moment&)> images;
@@ -141,6 +147,8 @@ struct RunResult {
   std::vector<FrameRecord> fisheye_records;
   FrameConditions conditions;
   FrameConditions fisheye_conditions;
+  double disparity_offset = 0;  // of the newest stereo frame, see TrackedFrame
+  double shading = 0;           // likewise
   std::shared_ptr<const MapSnapshot> map;
   std::size_t components = 0;     // of the map
   std::vector<LoopRecord> loops;  // places proposed, in the order in which they were looked at

@@ -58,8 +58,8 @@ struct State {
 struct StateRequest {
   std::shared_ptr<Channel<State>> answer;
 };
-using Event =
-    std::variant<TrackedEvent, LeftOut, ImageEvent, MapEvent, LoopRecord, StateRequest, EndEvent>;
+using Event = std::variant<TrackedEvent, LeftOut, ImageEvent, KeyframeResult, MapEvent, LoopRecord,
+                           StateRequest, EndEvent>;
 
 double now_since_1970() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
@@ -172,6 +172,8 @@ class LiveFeed::Work {
   }
 
   void take(ImageEvent& event) { images_.push_back(std::move(event)); }
+
+  void take(KeyframeResult& keyframe) { state_.add(keyframe); }
 
   void take(MapEvent& event) {
     map_ = std::move(event.map);
@@ -322,6 +324,7 @@ LiveFeed::~LiveFeed() { end(""); }
 
 void LiveFeed::frame(const FrameResult& frame) { work_->frame(frame); }
 void LiveFeed::left_out(const LeftOut& input) { work_->tell(input); }
+void LiveFeed::keyframe(const KeyframeResult& keyframe) { work_->tell(keyframe); }
 void LiveFeed::loop(const LoopRecord& loop) { work_->tell(loop); }
 void LiveFeed::images(const Moment& moment) { work_->images(moment); }
 void LiveFeed::end(const std::string& text) { work_->end(text); }

@@ -27,6 +27,7 @@ class LiveFeed {
   // Any thread.
   void frame(const FrameResult& frame);
   void left_out(const LeftOut& input);
+  void keyframe(const KeyframeResult& keyframe);  // of a frame that was told before
   void map(std::shared_ptr<const MapSnapshot> map, MapChange change);
   void loop(const LoopRecord& loop);
 

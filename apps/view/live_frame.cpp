@@ -1,5 +1,6 @@
 #include "apps/view/live_frame.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -30,6 +31,7 @@ void add_pose(const TrackedFrame& tracked, LiveFrame& live) {
 LiveFrame live_frame(const FrameResult& frame) {
   LiveFrame live;
   RunFrame& line = live.line;
+  live.index = frame.index;
   line.stereo = frame.camera == CameraKind::kStereo;
   line.time = to_seconds(frame.time);
   line.state = to_string(frame.state);
@@ -56,6 +58,16 @@ LiveFrame live_frame(const LeftOut& input) {
   live.line.state = input.reason;
   live.line.covariance.fill(kUnknown);
   return live;
+}
+
+void became_keyframe(const KeyframeResult& keyframe, std::vector<LiveFrame>& frames) {
+  const auto same = std::find_if(frames.rbegin(), frames.rend(), [&](const LiveFrame& frame) {
+    return frame.index == keyframe.index &&
+           frame.line.stereo == (keyframe.camera == CameraKind::kStereo);
+  });
+  if (same == frames.rend()) return;
+  same->reference = keyframe.id;
+  same->cam_from_reference = Rigid3d();
 }
 
 Json frame_json(const LiveFrame& live) {

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <optional>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -11,10 +12,11 @@
 namespace hybrid_slam {
 
 // What is kept of a frame while a run is watched: its line of frames.csv, and through which
-// keyframe it follows what becomes of the map.
+// keyframe it follows what becomes of the map: another one, or, once it became one, its own.
 struct LiveFrame {
   RunFrame line;
-  KeyframeId reference;  // invalid: it follows none
+  std::int64_t index = -1;  // FrameResult::index; -1: it was left out
+  KeyframeId reference;     // invalid: it follows none
   Rigid3d cam_from_reference;
   double keyframes = kUnknown;  // of the map that it was tracked in
   double landmarks = kUnknown;
@@ -22,6 +24,9 @@ struct LiveFrame {
 
 LiveFrame live_frame(const FrameResult& frame);
 LiveFrame live_frame(const LeftOut& input);
+
+// Of the newest such frame, if it is among them.
+void became_keyframe(const KeyframeResult& keyframe, std::vector<LiveFrame>& frames);
 
 // The event "frame": the values of frames.csv by their names there, the pose as position and
 // rotation (x y z w). What frames.csv leaves empty is null.

@@ -19,6 +19,7 @@ class LiveState {
   // Of many frames half are forgotten now and then, as the report leaves them out.
   void add(LiveFrame frame);
   void add(const LoopRecord& loop);
+  void add(const KeyframeResult& keyframe) { became_keyframe(keyframe, frames_); }
 
   const LiveFrame& newest() const { return frames_.back(); }
 

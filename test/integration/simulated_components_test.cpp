@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "apps/view/live_frame.h"
 #include "backend/map/components.h"
 #include "test/integration/simulated_runs.h"
 #include "test/support/random.h"
@@ -33,9 +34,9 @@ SimulatedSource interrupted_lap(std::size_t last, std::uint64_t seed, const Gap&
   return source;
 }
 
-RunResult run(const SimulatedSource& source, bool realtime) {
+RunResult run(const SimulatedSource& source, bool realtime, const ReplayHooks& hooks = {}) {
   return (realtime ? run_realtime : run_every_frame)(source, simulated_options(),
-                                                     simulated_run(source), {}, {});
+                                                     simulated_run(source), hooks, {});
 }
 
 // Of the frames from `begin` on that have poses in the component of most frames; their world is the
@@ -105,6 +106,30 @@ TEST_CASE("Components are joined when the vehicle comes back", "[integration]") 
       CHECK(worst_error(result, source, source.size() - 10) < 0.05);
       CHECK(worst_error(result, source) < 0.5);
       CHECK(faults_of(*result.map) == "");
+    }
+  }
+}
+
+TEST_CASE("Who watches sees a component that was joined where the results have it",
+          "[integration]") {
+  const SimulatedSource source = interrupted_lap(kOrbitFrames + 18, 1);
+  for (const bool realtime : {false, true}) {
+    std::vector<LiveFrame> told;
+    ReplayHooks hooks;
+    hooks.frame = [&](const FrameResult& frame) { told.push_back(live_frame(frame)); };
+    hooks.keyframe = [&](const KeyframeResult& keyframe) { became_keyframe(keyframe, told); };
+    const RunResult result = run(source, realtime, hooks);
+    REQUIRE(joining_loops(result) == 1);
+    const RunStory story = live_story(told, result.map.get());
+    REQUIRE(story.frames.size() == result.records.size());
+    for (std::size_t i = 0; i < result.records.size(); ++i) {
+      if (!result.records[i].frame.tracked()) continue;
+      const Rigid3d expected = inverse(result.cam_from_world(result.records[i]));
+      INFO("frame " << i << (realtime ? ", realtime" : ", every frame"));
+      REQUIRE(story.frames[i].world_from_cam);
+      const Rigid3d& shown = *story.frames[i].world_from_cam;
+      CHECK((shown.translation() - expected.translation()).norm() < 1e-9);
+      CHECK(shown.rotation().angularDistance(expected.rotation()) < 1e-7);
     }
   }
 }

@@ -144,7 +144,7 @@ function lineChart(title, unit, series, limit) {
           'h3', {}, title + (unit ? ' [' + unit + ']' : ''), ' ',
           make(
               'small', {}, legend,
-              beyond ? ` ${beyond === 1 ? 'one value is' : beyond + ' values are'} beyond the chart, at most ${
+              beyond ? `· ${beyond === 1 ? 'one value is' : beyond + ' values are'} beyond the chart, at most ${
                            withUnit(Math.max(...all), unit)}` :
                        '')),
       svg);
@@ -187,39 +187,13 @@ function runsOf(camera, word) {
 
 // bars: [{name, value, mark, text}], a mark being a second value as a tick; `limit` likewise over
 // all.
-function barChart(bars, unit, limit) {
+function barChart(bars, limit) {
   const rowHeight = 20, left = 150, width = 700, height = bars.length * rowHeight;
-  const top =
-      Math.max(
-          1e-9, ...bars.map(bar => Math.max(bar.value, bar.mark || 0)), limit ? limit.value : 0) *
-      1.02;
-  const x = value => left + (width - left - 240) * value / top;
+  const longest = Math.max(1e-9, ...bars.map(bar => Math.max(bar.value, bar.mark)));
+  // One that is very long leaves the others, and the limit, something to be seen of.
+  const top = limit ? Math.max(limit.value, Math.min(longest, 5 * limit.value)) : longest;
+  const x = value => left + (width - left - 240) * Math.min(1, value / top);
   const svg = make('svg', {viewBox: `0 0 ${width} ${height + 18}`, role: 'img'});
-  bars.forEach((bar, k) => {
-    const y = k * rowHeight;
-    svg.append(
-        make('text', {class: 'label', x: left - 6, y: y + 14, 'text-anchor': 'end'}, bar.name),
-        make('rect', {
-          x: left,
-          y: y + 4,
-          width: Math.max(0.5, x(bar.value) - left),
-          height: 12,
-          fill: bar.color || 'var(--s-map)'
-        }),
-        make(
-            'text',
-            {class: 'label', x: Math.max(x(bar.value), bar.mark ? x(bar.mark) : 0) + 6, y: y + 14},
-            bar.text || withUnit(bar.value, unit)));
-    if (bar.mark)
-      svg.append(make('line', {
-        x1: x(bar.mark),
-        x2: x(bar.mark),
-        y1: y + 2,
-        y2: y + 18,
-        stroke: 'var(--ink)',
-        'stroke-width': 2
-      }));
-  });
   if (limit) {
     svg.append(
         make('line', {
@@ -234,6 +208,30 @@ function barChart(bars, unit, limit) {
             'text', {class: 'label', x: x(limit.value), y: height + 13, 'text-anchor': 'middle'},
             limit.name));
   }
+  bars.forEach((bar, k) => {
+    const y = k * rowHeight;
+    svg.append(
+        make('text', {class: 'label', x: left - 6, y: y + 14, 'text-anchor': 'end'}, bar.name),
+        make('rect', {
+          x: left,
+          y: y + 4,
+          width: Math.max(0.5, x(bar.value) - left),
+          height: 12,
+          fill: 'var(--s-map)'
+        }),
+        make(
+            'text', {class: 'label', x: Math.max(x(bar.value), x(bar.mark)) + 6, y: y + 14},
+            (bar.mark > top ? '→ ' : '') + bar.text));
+    if (bar.mark <= top)
+      svg.append(make('line', {
+        x1: x(bar.mark),
+        x2: x(bar.mark),
+        y1: y + 2,
+        y2: y + 18,
+        stroke: 'var(--ink)',
+        'stroke-width': 2
+      }));
+  });
   return svg;
 }
 

@@ -41,6 +41,7 @@ function mapSection() {
         'p', {class: 'soft', style: 'padding:1rem'},
         'This browser shows no WebGL: the map cannot be drawn. All other sections are complete; map.png shows the map from above.'));
   const layers = [], follow = make('input', {type: 'checkbox'});
+  const hidden = new Set(['error ellipses']);  // what is not ticked
   let factor = 0;
   const paint = () => {
     findComponents();
@@ -69,9 +70,15 @@ function mapSection() {
     scene.set('ellipses', 'lines', ellipses.lines.positions, ellipses.lines.colors);
     factor = ellipses.factor;
     mark(selection.frame);
+    showLegend();
+  };
+  // Of what is shown.
+  const showLegend = () => {
     const states = frames.states.filter(state => STATES.includes(state) && state !== 'lost');
     legend.replaceChildren(
-        make('div', {}, 'landmarks: ', LANDMARK_COLORS[colorBy.value].legend(data.landmarks)),
+        hidden.has('landmarks') ?
+            '' :
+            make('div', {}, 'landmarks: ', LANDMARK_COLORS[colorBy.value].legend(data.landmarks)),
         frames.count ?
             make(
                 'div', {}, `paths by ${pathBy.value}: `,
@@ -80,16 +87,18 @@ function mapSection() {
                     COMPONENTS.map(
                         name => swatch(`var(${componentVariable(name)})`, String(name)))) :
             '',
-        data.keyframes.count && pathBy.value === 'state' ?
+        data.keyframes.count && pathBy.value === 'state' && !hidden.has('keyframes') ?
             make(
                 'div', {}, 'keyframes: ', swatch('var(--s-map)', 'stereo'),
                 data.keyframes.camera.includes(1) ? swatch('var(--truth)', 'fisheye') : '') :
             '',
-        data.truth.count ? make('div', {}, swatch('var(--ink)', 'truth')) : '',
-        data.loops.some(loop => loop.outcome === 'accepted') ?
+        data.truth.count && !hidden.has('truth') ?
+            make('div', {}, swatch('var(--ink)', 'truth')) :
+            '',
+        data.loops.some(loop => loop.outcome === 'accepted') && !hidden.has('loops') ?
             make('div', {}, swatch('var(--s-lost)', 'loops that were closed')) :
             '',
-        factor ?
+        factor && !hidden.has('error ellipses') ?
             make(
                 'div', {},
                 swatch(
@@ -136,8 +145,15 @@ function mapSection() {
     if (!there && !(data.live && name !== 'truth')) return;
     const input = make('input', {
       type: 'checkbox',
-      checked: name !== 'error ellipses',
-      change: () => layerNames.forEach(layer => scene.show(layer, input.checked))
+      checked: !hidden.has(name),
+      change: () => {
+        if (input.checked)
+          hidden.delete(name);
+        else
+          hidden.add(name);
+        layerNames.forEach(layer => scene.show(layer, input.checked));
+        showLegend();
+      }
     });
     controls.append(make('label', {}, input, ' ' + name));
     layers.push(() => layerNames.forEach(layer => scene.show(layer, input.checked)));

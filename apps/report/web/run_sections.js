@@ -33,7 +33,7 @@ function loopsSection() {
                        loop.joins ? 'yes: two components became one' : 'no']),
               [2, 3, 4]) :
           '',
-      make('div', {class: 'pair'}, pairs.map(pair => make('div', {class: 'pictures'}, pair))));
+      make('div', {class: 'matches'}, pairs.map(pair => make('div', {}, pair))));
 }
 
 // (g) Against the truth.
@@ -107,7 +107,8 @@ function timeSection() {
           'Each stage, wherever it ran: mean (bar), 95th percentile (tick). Stages may run side by side.' +
               (limit && !shown ?
                    ` The frame period, ${withUnit(period, 'ms')}, is beyond the chart.` :
-                   '')),
+                   shown && most > 5 * shown.value ? ' →: longer than the chart.' :
+                                                     '')),
       make(
           'div', {style: 'max-width:56rem'},
           barChart(
@@ -118,7 +119,7 @@ function timeSection() {
                            text: `${withUnit(t.mean, 'ms')} (p95 ${withUnit(t.p95, 'ms')}, ${
                                t.count} times)`
                          })),
-              'ms', shown)),
+              shown)),
       lineChart(
           'CPU time per stereo frame, all threads', 'ms',
           [{name: 'stereo', camera: 0, color: 'var(--s-map)', values: i => frames.cpu_ms[i]}]) ||

@@ -186,6 +186,36 @@ TEST_CASE("a map is told whole, then what changed of it", "[view]") {
   CHECK(next_event(*watcher).first == "state");
 }
 
+TEST_CASE("a frame that begins a component moves with its keyframe", "[view]") {
+  FilledMap filled = small_map();
+  const MapSnapshot& map = filled.map.view();
+  LiveFeed feed(hybrid_run());
+  FrameResult first = frame_at(0, TrackingState::kStarting);
+  first.index = 8;
+  first.tracked.source = PoseSource::kInitialization;
+  first.tracked.cam_from_world = map.cam_from_world(map.origin());
+  feed.frame(first);
+  first.camera = CameraKind::kFisheye;  // of the same moment, and no keyframe
+  feed.frame(first);
+  feed.keyframe({CameraKind::kStereo, 8, map.origin()});
+  feed.keyframe({CameraKind::kStereo, 9, map.keyframe_ids().back()});  // of no frame that was told
+
+  // Another component takes it up.
+  const Rigid3d moved(Eigen::Quaterniond(0.6, 0, 0.8, 0), Eigen::Vector3d(3, -2, 5));
+  filled.map.move({{map.origin(), moved}}, {});
+  feed.map(filled.map.snapshot(), MapChange::kLoop);
+  const auto watcher = feed.watch();
+  const Json frames = next_event(*watcher).second["frames"];
+  const Eigen::Vector3d now = inverse(moved).translation();
+  const Eigen::Vector3d told = inverse(first.tracked.cam_from_world).translation();
+  const std::vector<float> positions = floats(frames["position"]);
+  REQUIRE(positions.size() == 6);
+  for (int k = 0; k < 3; ++k) {
+    CHECK(positions[static_cast<std::size_t>(k)] == Approx(now[k]));
+    CHECK(positions[static_cast<std::size_t>(3 + k)] == Approx(told[k]).margin(1e-6));
+  }
+}
+
 TEST_CASE("images are kept while somebody watches, and told with their frame", "[view]") {
   const FilledMap filled = small_map();
   LiveFeed feed(hybrid_run());
