@@ -189,15 +189,19 @@ std::vector<fs::path> footage_files(const std::vector<std::string>& source) {
 FootageList list_footage(const std::vector<std::string>& source) {
   const std::vector<fs::path> paths = footage_files(source);
   if (paths.empty()) throw InputError(source.front() + ": holds no images");
+  return order_footage(paths, source.front());
+}
+
+FootageList order_footage(const std::vector<fs::path>& files, const std::string& source) {
   std::vector<NameParts> names;
-  for (const fs::path& path : paths) names.push_back(cut(path.stem().string()));
+  for (const fs::path& path : files) names.push_back(cut(path.stem().string()));
   const Keys keys = keys_of(names);
   FootageList list;
   list.order = keys.keys.empty() ? NameOrder::kNames : keys.order;
-  if (!keys.note.empty()) list.note = source.front() + ": " + keys.note;
-  for (std::size_t i = 0; i < paths.size(); ++i) {
+  if (!keys.note.empty()) list.note = source + ": " + keys.note;
+  for (std::size_t i = 0; i < files.size(); ++i) {
     list.images.push_back(
-        {paths[i], keys.keys.empty() ? static_cast<std::int64_t>(i) : keys.keys[i]});
+        {files[i], keys.keys.empty() ? static_cast<std::int64_t>(i) : keys.keys[i]});
   }
   std::stable_sort(list.images.begin(), list.images.end(),
                    [](const FootageImage& a, const FootageImage& b) { return a.key < b.key; });

@@ -37,4 +37,9 @@ std::vector<std::filesystem::path> footage_files(const std::vector<std::string>&
 // Throws InputError if there are no images, or two have one number.
 FootageList list_footage(const std::vector<std::string>& source);
 
+// The same of these files by their names alone, which are ascending: no matter whether they are
+// there any more. `source`: what a note calls them.
+FootageList order_footage(const std::vector<std::filesystem::path>& files,
+                          const std::string& source);
+
 }  // namespace hybrid_slam

@@ -87,7 +87,7 @@ void WatchedSource::look() {
   }
 }
 
-// Files become complete in the order of their names.
+// Files become complete in the order of their names. What is gone again is not waited for.
 void WatchedSource::look_at(LiveCamera camera) {
   Folder& folder = of(folders_, camera);
   for (const fs::path& path : files_now(folder.source)) {
@@ -97,13 +97,17 @@ void WatchedSource::look_at(LiveCamera camera) {
       folder.pending.push_back({path, 0});
     }
   }
-  std::vector<std::string> complete;
+  std::erase_if(folder.pending, [](const PendingFile& file) {
+    std::error_code error;
+    return !fs::exists(file.path, error) && !error;
+  });
+  std::vector<fs::path> complete;
   auto at = folder.pending.begin();
   for (; at != folder.pending.end(); ++at) {
     std::error_code error;
     const std::uintmax_t size = fs::file_size(at->path, error);
     if (error || size == 0 || std::exchange(at->size, size) != size) break;
-    complete.push_back(at->path.string());
+    complete.push_back(at->path);
   }
   for (auto rest = at; rest != folder.pending.end(); ++rest) {
     std::error_code error;
@@ -122,15 +126,16 @@ void WatchedSource::look_at(LiveCamera camera) {
 }
 
 // The first name stands beside the new ones, so that what changes in them shows.
-void WatchedSource::add(LiveCamera camera, const std::vector<std::string>& complete) {
+void WatchedSource::add(LiveCamera camera, const std::vector<fs::path>& complete) {
   Folder& folder = of(folders_, camera);
-  std::vector<std::string> names = complete;
+  std::vector<fs::path> names = complete;
   if (folder.first.empty()) {
     folder.first = complete.front();
   } else {
-    names.push_back(folder.first.string());
+    names.push_back(folder.first);
   }
-  const FootageList list = list_footage(names);
+  std::sort(names.begin(), names.end());
+  const FootageList list = order_footage(names, names.front().string());
   if (!folder.order && !list.note.empty()) tell(list.note);
   if (!folder.order) folder.order = list.order;
   for (const FootageImage& image : list.images) {

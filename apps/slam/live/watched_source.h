@@ -50,7 +50,7 @@ class WatchedSource final : public SetSource {
 
   void look();
   void look_at(LiveCamera camera);
-  void add(LiveCamera camera, const std::vector<std::string>& complete);
+  void add(LiveCamera camera, const std::vector<std::filesystem::path>& complete);
   std::int64_t stamp_of(const FootageImage& image, NameOrder order, const Folder& folder);
   std::optional<ImageSet> take();
   bool load(ImageSet& set);

@@ -66,6 +66,38 @@ TEST_CASE("A folder that grows becomes sets in the order of its names") {
   CHECK(of(source.counts().alone, LiveCamera::kLeft) == 1);
 }
 
+TEST_CASE("Files that a recorder removes again stop nothing") {
+  Recording recording;
+  const auto write = [&](int number) {
+    write_text(recording.file("left", stamp_name(number)), png(50));
+    write_text(recording.file("right", stamp_name(number)), png(50));
+  };
+  for (int i = 0; i < 4; ++i) write(i);
+  WatchedSource source = recording.open();
+  for (int i = 0; i < 4; ++i) REQUIRE(source.next({}));
+  for (const char* const camera : {"left", "right"}) {
+    fs::remove(recording.file(camera, stamp_name(0)));
+  }
+  std::thread recorder([&] {
+    write_text(recording.file("left", stamp_name(4)), "");  // begun, and given up
+    std::this_thread::sleep_for(500ms);
+    fs::remove(recording.file("left", stamp_name(4)));
+    write(5);
+    write(6);
+  });
+  std::stop_source late;
+  std::jthread patience([&](const std::stop_token& done) {
+    for (int i = 0; i < 200 && !done.stop_requested(); ++i) std::this_thread::sleep_for(100ms);
+    late.request_stop();
+  });
+  for (int i = 5; i < 7; ++i) {
+    const auto set = source.next(late.get_token());
+    CHECK(set);
+    if (set) CHECK(set->left.stamp == 1'700'000'000'000'000'000 + i * 200'000'000LL);
+  }
+  recorder.join();
+}
+
 TEST_CASE("A file that is being written is waited for; a damaged one costs its own pair") {
   Recording recording;
   const std::string whole = png(50);
