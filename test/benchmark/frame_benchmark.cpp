@@ -55,7 +55,8 @@ StereoFeatures load(const FrameSource& source, std::size_t index) {
   }
   StageTimes times;
   FrameExtractor extractor(source.cameras(), slam_options(), SiftDevice::kCpu, {});
-  return extractor.extract(std::get<StereoImages>(moment.inputs.front()), times).frame.features;
+  return extractor.extract(std::get<StereoImages>(moment.inputs.front()), false, times)
+      .frame.features;
 }
 
 void sift(benchmark::State& state) {
@@ -112,7 +113,7 @@ const bool kRegistered = [] {
   add("simulated/odometer", [](benchmark::State& state) { odometer(state, simulated()); });
   add("simulated/sequence", [](benchmark::State& state) { sequence(state, simulated()); });
   if (kitti() == nullptr) return true;
-  static const ImageFrameSource kSource(*kitti(), slam_options());
+  static const ImageFrameSource kSource(*kitti());
   add("kitti/sift", sift);
   add("kitti/stereo_match", [](benchmark::State& state) {
     const FrameImages images = kitti()->read(0);

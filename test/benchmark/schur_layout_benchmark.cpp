@@ -39,6 +39,7 @@ struct RightOfStereo {
   static constexpr std::string_view kName = "right_of_stereo";
   static constexpr int kMeasurementDim = 2;
   static constexpr int kParamCount = 5;
+  static double focal_length(const double* params) { return params[0]; }
 
   template <typename T>
   static bool project(const T* params, const T* p, T* pixel) {
@@ -58,6 +59,7 @@ struct RightColumn {
   static constexpr std::string_view kName = "right_column";
   static constexpr int kMeasurementDim = 1;
   static constexpr int kParamCount = 5;
+  static double focal_length(const double* params) { return params[0]; }
 
   template <typename T>
   static bool project(const T* params, const T* p, T* u_right) {

@@ -125,7 +125,7 @@ void load_text(benchmark::State& state) { load(state, VocabularyFormat::kText); 
 
 // Keyframes of 2000 features. An image shares an eighth of them with each of its neighbours.
 struct Keyframes {
-  Keyframes(const Vocabulary& vocabulary, std::int64_t count) : index(vocabulary) {
+  Keyframes(const Vocabulary& vocabulary, std::int64_t count) {
     Random random(3);
     FeatureSet last = random_features(vocabulary, 2000, random);
     for (std::uint32_t i = 0; i < count; ++i) {
