@@ -89,8 +89,7 @@ class MapMatcher {
   // optimises. None where the pose is not believed, or where nothing is around: then the frame's
   // keypoints are as before, its pose and its landmarks are those that were not believed.
   std::optional<LocalMapMatch> match_local_map(const MapSnapshot& map,
-                                               const std::vector<LandmarkId>& seeds,
-                                               Frame& frame) const;
+                                               const std::vector<LandmarkId>& seeds, Frame& frame);
 
   // Finds the frame without a prediction, in the first of `keyframes` that shows it, or else
   // anywhere in the map: in the keyframes that look most like it, or in the newest ones where there

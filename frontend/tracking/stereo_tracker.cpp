@@ -313,8 +313,8 @@ bool StereoTracker::track_keyframes(Frame& frame, const MapSnapshot& map) const 
 }
 
 // None if the pose is not believed.
-std::optional<MapMatcher::LocalMapMatch> StereoTracker::track_local_map(
-    Frame& frame, const MapSnapshot& map) const {
+std::optional<MapMatcher::LocalMapMatch> StereoTracker::track_local_map(Frame& frame,
+                                                                        const MapSnapshot& map) {
   std::vector<LandmarkId> seeds = valid_ids(frame.landmarks);
   if (seeds.empty() && last_.known()) {
     seeds = valid_ids(last_.frame().landmarks);
