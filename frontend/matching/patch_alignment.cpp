@@ -62,22 +62,40 @@ void sample_square(const Level& level, double cx, double cy, int half_size, Samp
   }
 }
 
-// Needs floor(x) in 1 .. width - 3 and floor(y) in 1 .. height - 3.
-float sample_cubic(const Level& level, double x, double y) {
-  const int left = static_cast<int>(x);
-  const int top = static_cast<int>(y);
-  const std::array<float, 4> wx = cubic_weights(static_cast<float>(x - left));
-  const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top));
-  float sum = 0;
-  for (int j = 0; j < 4; ++j) {
-    const float* p = level.row(top - 1 + j) + (left - 1);
-    sum += wy[static_cast<std::size_t>(j)] *
-           (wx[0] * p[0] + wx[1] * p[1] + wx[2] * p[2] + wx[3] * p[3]);
+// A row of samples anywhere between pixels: one more step along the row is one of `step`. Weights
+// first, for several at once. Every sample needs floor(x) in 1 .. width - 3 and floor(y) in
+// 1 .. height - 3.
+void sample_row(const Level& level, const Eigen::Vector2d& centre, const Eigen::Vector2d& to_row,
+                const Eigen::Vector2d& step, int half_size, float* samples) {
+  constexpr std::size_t kMost = 2 * kMaxHalfSize + 1;
+  const auto count = static_cast<std::size_t>(2 * half_size + 1);
+  std::array<const float*, kMost> corner;  // of the 4 x 4 pixels around
+  std::array<float, kMost> tx, ty;
+  for (std::size_t i = 0; i < count; ++i) {
+    const int u = static_cast<int>(i) - half_size;
+    const double x = centre.x() + step.x() * u + to_row.x();
+    const double y = centre.y() + step.y() * u + to_row.y();
+    const int left = static_cast<int>(x);
+    const int top = static_cast<int>(y);
+    corner[i] = level.row(top - 1) + (left - 1);
+    tx[i] = static_cast<float>(x - left);
+    ty[i] = static_cast<float>(y - top);
   }
-  return sum;
+  std::array<std::array<float, 4>, kMost> wx, wy;
+  for (std::size_t i = 0; i < count; ++i) wx[i] = cubic_weights(tx[i]);
+  for (std::size_t i = 0; i < count; ++i) wy[i] = cubic_weights(ty[i]);
+  for (std::size_t i = 0; i < count; ++i) {
+    float along[4];
+    for (int j = 0; j < 4; ++j) {
+      const float* p = corner[i] + j * level.width;
+      along[j] = wx[i][0] * p[0] + wx[i][1] * p[1] + wx[i][2] * p[2] + wx[i][3] * p[3];
+    }
+    samples[i] =
+        wy[i][0] * along[0] + wy[i][1] * along[1] + wy[i][2] * along[2] + wy[i][3] * along[3];
+  }
 }
 
-// Whether sample_cubic works in the box centre +- (rx, ry).
+// Whether samples can be taken in the box centre +- (rx, ry).
 bool inside(const Level& level, double cx, double cy, double rx, double ry) {
   return cx - rx >= 1 && cy - ry >= 1 && cx + rx < level.width - 2 && cy + ry < level.height - 2;
 }
@@ -104,13 +122,9 @@ bool sample_target(const Level& level, int half_size, const Eigen::Matrix2d& war
   }
   const int side = 2 * half_size + 1;
   samples->resize(side * side);
-  float* sample = samples->data();
-  for (int v = -half_size; v <= half_size; ++v) {
-    for (int u = -half_size; u <= half_size; ++u, ++sample) {
-      const double x = centre.x() + warp(0, 0) * u + warp(0, 1) * v;
-      const double y = centre.y() + warp(1, 0) * u + warp(1, 1) * v;
-      *sample = sample_cubic(level, x, y);
-    }
+  float* row = samples->data();
+  for (int v = -half_size; v <= half_size; ++v, row += side) {
+    sample_row(level, centre, warp.col(1) * v, warp.col(0), half_size, row);
   }
   remove_mean(*samples);
   return true;
