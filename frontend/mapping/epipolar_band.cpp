@@ -1,5 +1,6 @@
 #include "frontend/mapping/epipolar_band.h"
 
+#include <bit>
 #include <limits>
 
 // Compiled once per instruction set; the best one that the machine has is chosen at run time.
@@ -13,11 +14,10 @@ namespace hybrid_slam {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// (normal . bearing)^2 <= factor * variance + own. Room for one vector more than is found.
+// (normal . bearing)^2 <= factor * variance + own.
 std::size_t rays_near_plane(const float* const* rays, std::size_t count, const float* normal,
                             float factor, float own, std::uint32_t* found) {
   const hn::CappedTag<float, 16> d;
-  const hn::RebindToUnsigned<decltype(d)> d32;
   const auto nx = hn::Set(d, normal[0]);
   const auto ny = hn::Set(d, normal[1]);
   const auto nz = hn::Set(d, normal[2]);
@@ -28,8 +28,13 @@ std::size_t rays_near_plane(const float* const* rays, std::size_t count, const f
     off = hn::MulAdd(nz, hn::LoadU(d, rays[2] + i), off);
     const auto band = hn::MulAdd(hn::Set(d, factor), hn::LoadU(d, rays[3] + i), hn::Set(d, own));
     const auto near = hn::Le(hn::Mul(off, off), band);
-    const auto places = hn::Iota(d32, static_cast<std::uint32_t>(i));
-    n += hn::CompressStore(places, hn::RebindMask(d32, near), d32, found + n);
+    if (hn::AllFalse(d, near)) continue;
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, near, bytes);
+    for (std::uint32_t bits = bytes[0] | bytes[1] << 8; bits != 0; bits &= bits - 1) {
+      found[n++] =
+          static_cast<std::uint32_t>(i) + static_cast<std::uint32_t>(std::countr_zero(bits));
+    }
   }
   return n;
 }
@@ -67,7 +72,7 @@ void EpipolarBand::find(const Eigen::Vector3d& normal, double variance, double f
                         std::vector<std::uint32_t>& found) const {
   const float* rays[] = {x_.data(), y_.data(), z_.data(), variance_.data()};
   const Eigen::Vector3f rounded = normal.cast<float>();
-  found.resize(x_.size() + kPadding);
+  found.resize(x_.size());
   found.resize(HWY_DYNAMIC_DISPATCH(rays_near_plane)(
       rays, x_.size(), rounded.data(), static_cast<float>(kRelative * factor),
       static_cast<float>(kRelative * factor * variance + kAbsolute), found.data()));
