@@ -107,7 +107,10 @@ class MapMatcher {
                     int new_points) const;
 
   // The frame becomes a keyframe: its image can serve as a reference.
-  void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }
+  void remember_keyframe(const MapSnapshot& map, const Frame& frame) {
+    refiner_.forget_culled(map);
+    refiner_.remember(frame);
+  }
 
   // See TrackRefiner.
   void learn_shading(const MapSnapshot& map, const Frame& frame) {

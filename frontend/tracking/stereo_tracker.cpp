@@ -333,7 +333,7 @@ TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, Tracke
   }
   if (result.keyframe) {
     chain_.begin();
-    matcher_.remember_keyframe(frame);
+    matcher_.remember_keyframe(map, frame);
   }
   untracked_ = result.tracked() ? std::nullopt : std::optional(frame);
   last_.remember(std::move(frame), result);

@@ -94,6 +94,14 @@ void TrackRefiner::remember(const Frame& frame) {
   }
 }
 
+void TrackRefiner::forget_culled(const MapSnapshot& map) {
+  if (camera_id_.value >= map.camera_count()) return;
+  const std::int64_t taken_in = map.newest_frame_index(camera_id_);  // later ones are on their way
+  for (auto& [index, image] : images_) {
+    if (index <= taken_in && map.find_frame(camera_id_, index) == nullptr) image.reset();
+  }
+}
+
 const ImagePyramid* TrackRefiner::image_of(std::int64_t frame_index) const {
   const auto at =
       std::lower_bound(images_.begin(), images_.end(), frame_index,

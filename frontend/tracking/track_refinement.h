@@ -45,6 +45,9 @@ class TrackRefiner {
   // The frame becomes a keyframe: its image can serve as reference.
   void remember(const Frame& frame);
 
+  // Lets go of the images of keyframes that were culled: a vehicle that hovers makes many.
+  void forget_culled(const MapSnapshot& map);
+
   // Looks at a tracked frame for what its tracks tell of the shading, if it is far enough from the
   // last one that was looked at for its tracks to be others.
   void learn_shading(const MapSnapshot& map, const Frame& frame);
@@ -87,7 +90,7 @@ class TrackRefiner {
   std::shared_ptr<const NoiseFloor> floor_;
   std::optional<Eigen::Vector3d> learnt_at_;  // where the last frame that was looked at stood
   std::deque<std::pair<std::int64_t, std::shared_ptr<const ImagePyramid>>>
-      images_;       // by frame index, ascending
+      images_;       // by frame index, ascending; null where the keyframe was culled
   Patches patches_;  // that the last frame was aligned with: the next mostly needs the same
 };
 

@@ -228,5 +228,36 @@ TEST_CASE("Without the image of a first view nothing moves") {
   unchanged(disabled);
 }
 
+TEST_CASE(
+    "Images of keyframes that were culled are let go, of those to come and of the others not") {
+  Wall wall;
+  TrackRefiner refiner(wall.camera_id, camera(), {});
+  std::vector<std::weak_ptr<const ImagePyramid>> images;
+  for (const std::int64_t index : {0, 1, 2}) {
+    Frame frame = wall.first;
+    frame.index = index;
+    frame.image = std::make_shared<const ImagePyramid>(*wall.first.image);
+    images.push_back(frame.image);
+    refiner.remember(frame);
+  }
+  const auto kept = [&] {
+    refiner.forget_culled(wall.map.view());
+    std::vector<bool> alive;
+    for (const auto& image : images) alive.push_back(!image.expired());
+    return alive;
+  };
+  CHECK(kept() == std::vector<bool>{true, true, true});  // 1 and 2 are not in the map yet
+  auto observations = std::make_shared<FrameObservations>(
+      *wall.map.view().at(wall.map.view().origin()).observations);
+  observations->frame_index = 1;
+  const KeyframeId second =
+      wall.map.add_keyframe({observations, Rigid3d(), wall.second.landmarks, {}, {}});
+  CHECK(kept() == std::vector<bool>{true, true, true});
+  MapEdit culled;
+  culled.erased_keyframes = {second};
+  wall.map.apply(culled);
+  CHECK(kept() == std::vector<bool>{true, false, true});
+}
+
 }  // namespace
 }  // namespace hybrid_slam
