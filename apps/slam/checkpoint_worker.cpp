@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "apps/slam/give_way.h"
+
 namespace hybrid_slam {
 
 std::optional<SessionFailure> save_checkpoint(const SaveCheckpoint& save, const MapSnapshot& map,
@@ -39,6 +41,7 @@ void CheckpointWorker::finish() {
 }
 
 void CheckpointWorker::work() {
+  give_way();
   std::size_t seen = 0;
   while (const auto map = maps_.next(seen)) {
     if (const auto failure = save_checkpoint(save_, *map, times_)) tell_(*failure);

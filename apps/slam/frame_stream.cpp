@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/slam/give_way.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -184,6 +186,7 @@ void FrameStream::make_extractor(Lock& lock) {
 }
 
 void FrameStream::work() {
+  give_way();
   StageTimes times;
   Lock lock(mutex_);
   try {

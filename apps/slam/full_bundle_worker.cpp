@@ -2,6 +2,8 @@
 
 #include <exception>
 
+#include "apps/slam/give_way.h"
+
 namespace hybrid_slam {
 
 FullBundleWorker::FullBundleWorker(const FullBundleOptions& options, MappingWorker& mapping)
@@ -27,6 +29,7 @@ void FullBundleWorker::finish(bool give_up) {
 }
 
 void FullBundleWorker::work() {
+  give_way();
   try {
     std::size_t seen = 0;
     while (const auto request = requests_.next(seen)) {

@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "apps/slam/give_way.h"
+
 namespace hybrid_slam {
 
 LoopWorker::LoopWorker(LoopClosing& closing, MappingWorker& mapping,
@@ -32,6 +34,7 @@ std::vector<KeyframeId> LoopWorker::take_keyframes() {
 }
 
 void LoopWorker::work() {
+  give_way();
   try {
     while (!stop_.stop_requested()) {
       const auto id = keyframes_.pop();

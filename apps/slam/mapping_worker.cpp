@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "apps/slam/give_way.h"
+
 namespace hybrid_slam {
 
 MappingWorker::MappingWorker(LocalMapping& mapping, const Vocabulary& vocabulary,
@@ -39,6 +41,7 @@ void MappingWorker::rethrow() const {
 }
 
 void MappingWorker::work() {
+  give_way();
   try {
     while (auto task = tasks_.pop()) {
       std::visit([this](auto& one) { run(one); }, *task);

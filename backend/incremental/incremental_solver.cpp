@@ -124,9 +124,13 @@ Eigen::VectorXd IncrementalSolver::block(std::uint32_t index) const {
 Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {
   if (condensed_in_.at(index) != kNone) return condensed_point(index);
   const LandmarkTerm& landmark = *landmarks_[index];
-  Eigen::Vector3d at = carried_base(landmark);
-  if (!landmark.solvable) return at;
-  at += displacement(landmark);
+  return landmark.solvable ? displaced(landmark, displacement(landmark)) : carried_base(landmark);
+}
+
+// A landmark's place, with its displacement beyond its anchor's motion.
+Eigen::Vector3d IncrementalSolver::displaced(const LandmarkTerm& landmark,
+                                             const Eigen::Vector3d& displacement) const {
+  Eigen::Vector3d at = carried_base(landmark) + displacement;
   if (landmark.anchor != LandmarkTerm::kNoAnchor) {
     at -= pose_with(landmark.anchor)
               .tangent.carried(landmark.base, tree_.delta(landmark.anchor) - landmark.anchor_delta);

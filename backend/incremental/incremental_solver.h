@@ -296,6 +296,8 @@ class IncrementalSolver final : private TermSource {
   Eigen::Matrix3d carrier_rotation(const Block& block) const;
   void fold(std::uint32_t variable);
   Eigen::Vector3d displacement(const LandmarkTerm& landmark) const;
+  Eigen::Vector3d displaced(const LandmarkTerm& landmark,
+                            const Eigen::Vector3d& displacement) const;
   Eigen::Vector3d carried_base(const LandmarkTerm& landmark) const;
 
   IncrementalOptions options_;

@@ -194,8 +194,8 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
   const LandmarkTerm& landmark = *landmarks_[index];
   Evaluation result;
   if (!landmark.solvable) return result;
-  const Eigen::Vector3d at = point(index);
   const Eigen::Vector3d by_point = displacement(landmark);
+  const Eigen::Vector3d at = displaced(landmark, by_point);
   for (const LandmarkView& view : landmark.views) {
     if (!view.usable) continue;
     const Rigid3d cam_from_world = pose_at(view.pose);

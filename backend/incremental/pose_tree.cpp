@@ -107,27 +107,22 @@ std::vector<std::uint32_t> PoseTree::detach(const std::vector<std::uint32_t>& to
 
 // Terms of which every pose is among these (local_ is set): the others belong to subtrees below.
 std::vector<std::uint32_t> PoseTree::terms_inside(const std::vector<std::uint32_t>& poses,
-                                                  const TermSource& terms) const {
+                                                  const TermSource& terms) {
+  ++look_;
   std::vector<std::uint32_t> inside;
   for (const std::uint32_t pose : poses) {
     for (const std::uint32_t term : terms.terms_of(pose)) {
+      if (term >= looked_at_.size()) looked_at_.resize(term + 1, 0);
+      if (looked_at_[term] == look_) continue;
+      looked_at_[term] = look_;
       const auto members = terms.poses_of(term);
-      // Once: at the first of its poses, or the first that is not shared.
-      const auto first = [&] {
-        if (!any_shared_) return *std::min_element(members.begin(), members.end());
-        return *std::min_element(members.begin(), members.end(),
-                                 [this](std::uint32_t a, std::uint32_t b) {
-                                   return std::pair(shared_[a], a) < std::pair(shared_[b], b);
-                                 });
-      };
-      if (first() != pose) continue;
       if (std::all_of(members.begin(), members.end(),
                       [&](std::uint32_t member) { return local_[member] != kOutside; })) {
         inside.push_back(term);
       }
     }
   }
-  sort_unique(inside);
+  std::sort(inside.begin(), inside.end());
   return inside;
 }
 
@@ -156,17 +151,23 @@ std::vector<std::uint32_t> PoseTree::own_terms(const Clique& clique,
 std::vector<std::vector<std::uint32_t>> PoseTree::adjacency_of(
     const std::vector<std::uint32_t>& poses, const std::vector<std::uint32_t>& inside,
     const std::vector<std::int32_t>& orphans, const TermSource& terms) const {
-  std::vector<std::vector<std::uint32_t>> adjacency(poses.size());
+  std::vector<std::vector<std::span<const std::uint32_t>>> groups(poses.size());  // of each pose
   const auto connect = [&](std::span<const std::uint32_t> members) {
-    for (const std::uint32_t a : members) {
-      for (const std::uint32_t b : members) {
-        if (a != b) adjacency[local_[a]].push_back(local_[b]);
-      }
-    }
+    for (const std::uint32_t pose : members) groups[local_[pose]].push_back(members);
   };
   for (const std::uint32_t term : inside) connect(terms.poses_of(term));
   for (const std::int32_t orphan : orphans) connect(at(orphan).separator);
-  for (auto& neighbours : adjacency) sort_unique(neighbours);
+  std::vector<std::vector<std::uint32_t>> adjacency(poses.size());
+  std::vector<std::uint32_t> neighbour_of(poses.size(), kOutside);  // the last of which it is one
+  for (std::uint32_t i = 0; i < poses.size(); ++i) {
+    neighbour_of[i] = i;
+    for (const std::span<const std::uint32_t> members : groups[i]) {
+      for (const std::uint32_t pose : members) {
+        if (std::exchange(neighbour_of[local_[pose]], i) != i) adjacency[i].push_back(local_[pose]);
+      }
+    }
+    std::sort(adjacency[i].begin(), adjacency[i].end());
+  }
   return adjacency;
 }
 

@@ -141,7 +141,7 @@ class PoseTree {
   std::vector<std::uint32_t> detach(const std::vector<std::uint32_t>& touched,
                                     std::vector<std::int32_t>& orphans);
   std::vector<std::uint32_t> terms_inside(const std::vector<std::uint32_t>& poses,
-                                          const TermSource& terms) const;
+                                          const TermSource& terms);
   std::vector<std::uint32_t> own_terms(const Clique& clique, const TermSource& terms) const;
   std::vector<std::vector<std::uint32_t>> adjacency_of(const std::vector<std::uint32_t>& poses,
                                                        const std::vector<std::uint32_t>& inside,
@@ -201,9 +201,11 @@ class PoseTree {
   // Of the last solve: its variables, and what their deltas and what was sent were before.
   std::vector<std::uint32_t> solved_variables_;
   std::vector<double> before_;
-  std::vector<std::int32_t> solved_;    // cliques of the last solve
-  std::vector<std::uint32_t> local_;    // scratch, by pose: index among the poses at hand
-  std::vector<std::uint32_t> slot_of_;  // scratch, by pose: slot in the front at hand
+  std::vector<std::int32_t> solved_;      // cliques of the last solve
+  std::vector<std::uint32_t> local_;      // scratch, by pose: index among the poses at hand
+  std::vector<std::uint32_t> slot_of_;    // scratch, by pose: slot in the front at hand
+  std::vector<std::uint32_t> looked_at_;  // scratch, by term: the last look for which it was
+  std::uint32_t look_ = 0;
   double last_cost_ = 0;
   std::size_t last_poses_ = 0;
   std::size_t last_undetermined_ = 0;

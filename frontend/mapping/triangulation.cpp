@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "frontend/mapping/epipolar_band.h"
 #include "frontend/matching/descriptor_distance.h"
 
 namespace hybrid_slam {
@@ -25,6 +26,7 @@ struct View {
   Rigid3d world_from_cam;
   double focal = 1;
   std::vector<OpenKeypoint> open;
+  EpipolarBand band;  // of all that was open at first
 
   const FrameObservations& observations() const { return *keyframe->observations; }
   Eigen::Vector3d center() const { return world_from_cam.translation(); }
@@ -32,7 +34,7 @@ struct View {
 
 View make_view(const MapSnapshot& map, KeyframeId id) {
   const Keyframe& keyframe = map.at(id);
-  View view{&keyframe, &map.camera(keyframe), inverse(keyframe.cam_from_world), 1, {}};
+  View view{&keyframe, &map.camera(keyframe), inverse(keyframe.cam_from_world), 1, {}, {}};
   view.focal = focal_length(*view.camera);
   for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
     const Keypoint& keypoint = view.observations().features.keypoints[i];
@@ -43,6 +45,7 @@ View make_view(const MapSnapshot& map, KeyframeId id) {
     if (bearing) {
       const double sigma = keypoint.sigma / view.focal;
       view.open.push_back({static_cast<std::uint32_t>(i), *bearing, sigma * sigma});
+      view.band.add(*bearing, sigma * sigma);
     }
   }
   return view;
@@ -74,9 +77,11 @@ bool baseline_suffices(const MapSnapshot& map, const View& a, const View& b,
 }
 
 // The keypoint of `b` that fits best by descriptor among those in the epipolar band of `a`'s ray.
+// None of `b` was taken out since the view was made. `near` is scratch.
 std::optional<OpenKeypoint> match_along_epipolar(const View& a, const OpenKeypoint& ray,
                                                  const View& b, const Rigid3d& b_from_a,
-                                                 const TriangulationOptions& options) {
+                                                 const TriangulationOptions& options,
+                                                 std::vector<std::uint32_t>& near) {
   const Eigen::Vector3d plane = b_from_a.translation().cross(b_from_a.rotation() * ray.bearing);
   const double norm = plane.norm();
   if (norm < 1e-12) {
@@ -89,7 +94,9 @@ std::optional<OpenKeypoint> match_along_epipolar(const View& a, const OpenKeypoi
   int second = best;
   const OpenKeypoint* found = nullptr;
   const double band_factor = options.epipolar_sigmas * options.epipolar_sigmas;
-  for (const OpenKeypoint& candidate : b.open) {
+  b.band.find(normal, ray.angular_variance, band_factor, near);
+  for (const std::uint32_t i : near) {
+    const OpenKeypoint& candidate = b.open[i];
     const double off_plane = normal.dot(candidate.bearing);
     if (off_plane * off_plane > band_factor * (candidate.angular_variance + ray.angular_variance)) {
       continue;
@@ -191,12 +198,13 @@ bool scales_agree(const View& a, std::uint32_t in_a, const View& b, std::uint32_
 }
 
 // Matches the open keypoints of both views; those that make a landmark are no longer open.
-void triangulate_pair(View& a, View& b, const TriangulationOptions& options,
+void triangulate_pair(View& a, const View& b, const TriangulationOptions& options,
                       std::vector<NewLandmark>& landmarks) {
   const Rigid3d b_from_a = b.keyframe->cam_from_world * a.world_from_cam;
   std::vector<char> used_b(b.observations().size(), 0);
+  std::vector<std::uint32_t> near;
   std::erase_if(a.open, [&](const OpenKeypoint& ray) {
-    const auto match = match_along_epipolar(a, ray, b, b_from_a, options);
+    const auto match = match_along_epipolar(a, ray, b, b_from_a, options, near);
     if (!match || used_b[match->index] != 0) {
       return false;
     }

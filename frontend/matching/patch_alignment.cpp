@@ -13,6 +13,13 @@ namespace {
 using Level = ImagePyramid::Level;
 using Samples = Eigen::VectorXf;
 
+// What the target's grey values are made of, each without its mean over the patch: the derivatives
+// by a shift of the patch, per pixel of the level; the values themselves (gain); the values times x
+// and times y (a gain that changes across the patch); x and y (a veil that does).
+enum Column { kShiftX, kShiftY, kGain, kGainX, kGainY, kVeilX, kVeilY, kColumns };
+using Columns = Eigen::Matrix<float, Eigen::Dynamic, kColumns>;
+using Normal = Eigen::Matrix<double, kColumns, kColumns>;
+
 // Texture below this has no place: sum of squared gradients per sample [(grey levels / px)^2].
 constexpr double kMinGradientEnergy = 0.5;
 constexpr double kMaxGainRatio = 4;
@@ -55,22 +62,40 @@ void sample_square(const Level& level, double cx, double cy, int half_size, Samp
   }
 }
 
-// Needs floor(x) in 1 .. width - 3 and floor(y) in 1 .. height - 3.
-float sample_cubic(const Level& level, double x, double y) {
-  const int left = static_cast<int>(x);
-  const int top = static_cast<int>(y);
-  const std::array<float, 4> wx = cubic_weights(static_cast<float>(x - left));
-  const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top));
-  float sum = 0;
-  for (int j = 0; j < 4; ++j) {
-    const float* p = level.row(top - 1 + j) + (left - 1);
-    sum += wy[static_cast<std::size_t>(j)] *
-           (wx[0] * p[0] + wx[1] * p[1] + wx[2] * p[2] + wx[3] * p[3]);
+// A row of samples anywhere between pixels: one more step along the row is one of `step`. Weights
+// first, for several at once. Every sample needs floor(x) in 1 .. width - 3 and floor(y) in
+// 1 .. height - 3.
+void sample_row(const Level& level, const Eigen::Vector2d& centre, const Eigen::Vector2d& to_row,
+                const Eigen::Vector2d& step, int half_size, float* samples) {
+  constexpr std::size_t kMost = 2 * kMaxHalfSize + 1;
+  const auto count = static_cast<std::size_t>(2 * half_size + 1);
+  std::array<const float*, kMost> corner;  // of the 4 x 4 pixels around
+  std::array<float, kMost> tx, ty;
+  for (std::size_t i = 0; i < count; ++i) {
+    const int u = static_cast<int>(i) - half_size;
+    const double x = centre.x() + step.x() * u + to_row.x();
+    const double y = centre.y() + step.y() * u + to_row.y();
+    const int left = static_cast<int>(x);
+    const int top = static_cast<int>(y);
+    corner[i] = level.row(top - 1) + (left - 1);
+    tx[i] = static_cast<float>(x - left);
+    ty[i] = static_cast<float>(y - top);
   }
-  return sum;
+  std::array<std::array<float, 4>, kMost> wx, wy;
+  for (std::size_t i = 0; i < count; ++i) wx[i] = cubic_weights(tx[i]);
+  for (std::size_t i = 0; i < count; ++i) wy[i] = cubic_weights(ty[i]);
+  for (std::size_t i = 0; i < count; ++i) {
+    float along[4];
+    for (int j = 0; j < 4; ++j) {
+      const float* p = corner[i] + j * level.width;
+      along[j] = wx[i][0] * p[0] + wx[i][1] * p[1] + wx[i][2] * p[2] + wx[i][3] * p[3];
+    }
+    samples[i] =
+        wy[i][0] * along[0] + wy[i][1] * along[1] + wy[i][2] * along[2] + wy[i][3] * along[3];
+  }
 }
 
-// Whether sample_cubic works in the box centre +- (rx, ry).
+// Whether samples can be taken in the box centre +- (rx, ry).
 bool inside(const Level& level, double cx, double cy, double rx, double ry) {
   return cx - rx >= 1 && cy - ry >= 1 && cx + rx < level.width - 2 && cy + ry < level.height - 2;
 }
@@ -97,100 +122,81 @@ bool sample_target(const Level& level, int half_size, const Eigen::Matrix2d& war
   }
   const int side = 2 * half_size + 1;
   samples->resize(side * side);
-  float* sample = samples->data();
-  for (int v = -half_size; v <= half_size; ++v) {
-    for (int u = -half_size; u <= half_size; ++u, ++sample) {
-      const double x = centre.x() + warp(0, 0) * u + warp(0, 1) * v;
-      const double y = centre.y() + warp(1, 0) * u + warp(1, 1) * v;
-      *sample = sample_cubic(level, x, y);
-    }
+  float* row = samples->data();
+  for (int v = -half_size; v <= half_size; ++v, row += side) {
+    sample_row(level, centre, warp.col(1) * v, warp.col(0), half_size, row);
   }
   remove_mean(*samples);
   return true;
 }
 
-// What a target says of the shift and the gain, its slopes and the veil's estimated along with
-// them: three numbers, each the scalar product of the target with a patch of weights.
-class Solver {
- public:
-  Solver(const ReferencePatch& patch, bool horizontal_only) {
-    ReferencePatch::Normal normal = patch.normal;
-    if (horizontal_only) hold(ReferencePatch::kShiftY, &normal);
-    ReferencePatch::Normal inverse = normal.inverse();
-    is_usable_ = inverse.allFinite() && has_place(inverse, patch.columns.rows(), horizontal_only);
-    if (!is_usable_) return;
-    if (horizontal_only) {
-      inverse.row(ReferencePatch::kShiftY).setZero();
-      inverse.col(ReferencePatch::kShiftY).setZero();
-    }
-    weights_.noalias() = patch.columns * inverse.leftCols<3>().cast<float>();
+void hold(int column, Normal* normal) {
+  normal->row(column).setZero();
+  normal->col(column).setZero();
+  (*normal)(column, column) = 1;
+}
+
+// Whether enough texture is left beside gain, veil and their slopes.
+bool has_place(const Normal& inverse, Eigen::Index samples, bool horizontal_only) {
+  const double energy = kMinGradientEnergy * static_cast<double>(samples);
+  const double along_x = 1 / inverse(0, 0);
+  const double along_y = horizontal_only ? 0 : 1 / inverse(1, 1);
+  return along_x + along_y >= energy;
+}
+
+// Three numbers are sought, each the scalar product of the target with a patch of weights.
+void find_weights(const Columns& columns, Normal normal, bool horizontal_only,
+                  ReferencePatch* patch) {
+  if (horizontal_only) hold(kShiftY, &normal);
+  Normal inverse = normal.inverse();
+  patch->usable = inverse.allFinite() && has_place(inverse, columns.rows(), horizontal_only);
+  if (!patch->usable) return;
+  if (horizontal_only) {
+    inverse.row(kShiftY).setZero();
+    inverse.col(kShiftY).setZero();
   }
-
-  bool is_usable() const { return is_usable_; }
-
-  // (shift_x, shift_y, gain).
-  Eigen::Vector3d solve(const Samples& target) const {
-    return (weights_.transpose() * target).cast<double>();
-  }
-
- private:
-  static void hold(int column, ReferencePatch::Normal* normal) {
-    normal->row(column).setZero();
-    normal->col(column).setZero();
-    (*normal)(column, column) = 1;
-  }
-
-  // Whether enough texture is left beside gain, veil and their slopes.
-  static bool has_place(const ReferencePatch::Normal& inverse, Eigen::Index samples,
-                        bool horizontal_only) {
-    const double energy = kMinGradientEnergy * static_cast<double>(samples);
-    const double along_x = 1 / inverse(0, 0);
-    const double along_y = horizontal_only ? 0 : 1 / inverse(1, 1);
-    return along_x + along_y >= energy;
-  }
-
-  Eigen::Matrix<float, Eigen::Dynamic, 3> weights_;
-  bool is_usable_ = false;
-};
+  patch->weights.noalias() = columns * inverse.leftCols<3>().cast<float>();
+}
 
 // How well the target's samples fit gain * values.
 void judge(const ReferencePatch& patch, const Samples& target, Alignment* result) {
   const double tt = target.squaredNorm();
-  const double rr = patch.normal(ReferencePatch::kGain, ReferencePatch::kGain);
-  const double tr = target.dot(patch.columns.col(ReferencePatch::kGain));
+  const double rr = patch.energy;
+  const double tr = target.dot(patch.values);
   result->correlation = tt > 0 ? tr / std::sqrt(tt * rr) : 0;
   const double squares = std::max(0.0, tt - tr * tr / rr);
   result->residual = std::sqrt(squares / static_cast<double>(target.size()));
 }
 
 // From samples with a rim of one pixel.
-void fill_columns(const Samples& samples, int side, ReferencePatch* patch) {
-  auto& columns = patch->columns;
-  columns.resize((side - 2) * (side - 2), Eigen::NoChange);
-  const int half = patch->half_size;
+Columns columns_of(const Samples& samples, int half) {
+  const int side = 2 * half + 3;
+  Columns columns((side - 2) * (side - 2), kColumns);
   Eigen::Index i = 0;
   for (int v = -half; v <= half; ++v) {
     for (int u = -half; u <= half; ++u, ++i) {
       const float* s = samples.data() + (v + half + 1) * side + (u + half + 1);
-      columns(i, ReferencePatch::kShiftX) = 0.5F * (s[1] - s[-1]);
-      columns(i, ReferencePatch::kShiftY) = 0.5F * (s[side] - s[-side]);
-      columns(i, ReferencePatch::kGain) = s[0];
-      columns(i, ReferencePatch::kVeilX) = static_cast<float>(u);
-      columns(i, ReferencePatch::kVeilY) = static_cast<float>(v);
+      columns(i, kShiftX) = 0.5F * (s[1] - s[-1]);
+      columns(i, kShiftY) = 0.5F * (s[side] - s[-side]);
+      columns(i, kGain) = s[0];
+      columns(i, kVeilX) = static_cast<float>(u);
+      columns(i, kVeilY) = static_cast<float>(v);
     }
   }
-  remove_mean(columns.col(ReferencePatch::kGain));
-  const auto gain = columns.col(ReferencePatch::kGain).array();
-  columns.col(ReferencePatch::kGainX) = gain * columns.col(ReferencePatch::kVeilX).array();
-  columns.col(ReferencePatch::kGainY) = gain * columns.col(ReferencePatch::kVeilY).array();
-  for (const auto k : {ReferencePatch::kShiftX, ReferencePatch::kShiftY, ReferencePatch::kGainX,
-                       ReferencePatch::kGainY}) {
-    remove_mean(columns.col(k));
-  }
-  // In double: what is sought is a small difference between columns that are much alike.
-  const Eigen::Matrix<double, Eigen::Dynamic, ReferencePatch::kColumns> exact =
-      columns.cast<double>();
-  patch->normal.noalias() = exact.transpose() * exact;
+  remove_mean(columns.col(kGain));
+  const auto gain = columns.col(kGain).array();
+  columns.col(kGainX) = gain * columns.col(kVeilX).array();
+  columns.col(kGainY) = gain * columns.col(kVeilY).array();
+  for (const auto k : {kShiftX, kShiftY, kGainX, kGainY}) remove_mean(columns.col(k));
+  return columns;
+}
+
+// In double: what is sought is a small difference between columns that are much alike.
+Normal normal_of(const Columns& columns) {
+  const Eigen::Matrix<double, Eigen::Dynamic, kColumns> exact = columns.cast<double>();
+  Normal normal;
+  normal.noalias() = exact.transpose() * exact;
+  return normal;
 }
 
 }  // namespace
@@ -216,12 +222,15 @@ std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, do
   const int half = options.half_size;
   if (!inside(level, cx, cy, half + 1, half + 1)) return std::nullopt;
 
-  const int side = 2 * half + 3;  // one more all around for the derivatives
   Samples samples;
-  sample_square(level, cx, cy, half + 1, &samples);
-  fill_columns(samples, side, &patch);
-  const double energy = kMinGradientEnergy * static_cast<double>(patch.columns.rows());
-  if (patch.normal(0, 0) + patch.normal(1, 1) < energy) return std::nullopt;
+  sample_square(level, cx, cy, half + 1, &samples);  // one more all around for the derivatives
+  const Columns columns = columns_of(samples, half);
+  const Normal normal = normal_of(columns);
+  const double least = kMinGradientEnergy * static_cast<double>(columns.rows());
+  if (normal(kShiftX, kShiftX) + normal(kShiftY, kShiftY) < least) return std::nullopt;
+  find_weights(columns, normal, options.horizontal_only, &patch);
+  patch.values = columns.col(kGain);
+  patch.energy = normal(kGain, kGain);
   return patch;
 }
 
@@ -240,14 +249,13 @@ Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,
   const double pixel = std::ldexp(1.0, level_index);
   const Eigen::Matrix2d warp = target_from_reference * std::ldexp(1.0, patch.level - level_index);
 
-  const Solver solver(patch, options.horizontal_only);
-  if (!solver.is_usable()) return result;
+  if (!patch.usable) return result;
   const Eigen::Vector2d first = start / pixel;
   Eigen::Vector2d centre = first;
   Samples samples;
   for (int i = 0; i < options.max_iterations; ++i) {
     if (!sample_target(level, patch.half_size, warp, centre, &samples)) return result;
-    const Eigen::Vector3d solution = solver.solve(samples);
+    const Eigen::Vector3d solution = (patch.weights.transpose() * samples).cast<double>();
     const double gain = solution.z();
     if (!(gain > 1 / kMaxGainRatio && gain < kMaxGainRatio)) return result;
     // The patch shifted by `solution / gain` looks like the target: the target's place moves back.

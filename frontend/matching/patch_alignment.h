@@ -22,22 +22,20 @@ struct AlignmentOptions {
 };
 
 // A square patch of a reference image around a keypoint, with what its alignment needs. Samples are
-// one pixel of its pyramid level apart.
+// one pixel of its pyramid level apart, row by row.
 struct ReferencePatch {
   int level = 0;
   int half_size = 0;
-  // What the target's grey values are made of, each row by row and without its mean over the patch:
-  // the derivatives by a shift of the patch, per pixel of the level; the values themselves (gain);
-  // the values times x and times y (a gain that changes across the patch); x and y (a veil that
-  // does).
-  enum Column { kShiftX, kShiftY, kGain, kGainX, kGainY, kVeilX, kVeilY, kColumns };
-  using Normal = Eigen::Matrix<double, kColumns, kColumns>;
-  Eigen::Matrix<float, Eigen::Dynamic, kColumns> columns;
-  Normal normal;  // of the columns
+  bool usable = false;  // enough texture is left beside gain, veil and their slopes
+  // What a target says of the shift [px of the level] and the gain: (shift_x, shift_y, gain) =
+  // weights^T target. The gain's slopes and the veil's are estimated along with them.
+  Eigen::Matrix<float, Eigen::Dynamic, 3> weights;
+  Eigen::VectorXf values;  // without their mean
+  double energy = 0;       // squared norm of the values
 };
 
-// The patch around (x, y) [px] in the pyramid level that fits a keypoint's scale [px]. None where
-// it would leave the image or has no texture.
+// The patch around (x, y) [px] in the pyramid level that fits a keypoint's scale [px], for
+// alignment with the same options. None where it would leave the image or has no texture.
 std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, double x, double y,
                                                    double scale, const AlignmentOptions& options);
 

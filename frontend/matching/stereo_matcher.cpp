@@ -93,7 +93,6 @@ class RowMatcher {
       if (std::max(scale_ratio, 1 / scale_ratio) > options_.max_scale_ratio) continue;
       candidates_.push_back(j);
     }
-    std::sort(candidates_.begin(), candidates_.end());
   }
 
   bool same_place(int a, int b) const {
@@ -107,7 +106,8 @@ class RowMatcher {
                   const std::vector<std::int32_t>& distances) const {
     RowMatch best;
     for (std::size_t k = 0; k < candidates.size(); ++k) {
-      if (best.index >= 0 && distances[k] >= best.distance) continue;
+      const bool tie = distances[k] == best.distance && candidates[k] < best.index;
+      if (best.index >= 0 && distances[k] >= best.distance && !tie) continue;
       best.index = candidates[k];
       best.distance = distances[k];
     }

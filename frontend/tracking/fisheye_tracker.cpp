@@ -92,7 +92,7 @@ TrackedFrame FisheyeTracker::track(Frame frame, const MapSnapshot& map, Keyframe
                                   frame.landmarks,
                                   {},
                                   result.reference};
-    matcher_.remember_keyframe(frame);
+    matcher_.remember_keyframe(map, frame);
   }
   last_.remember(std::move(frame), result);
   return result;

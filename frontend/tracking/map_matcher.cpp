@@ -146,7 +146,7 @@ MapMatcher::Search MapMatcher::match_projections(const MapSnapshot& map,
 }
 
 std::optional<MapMatcher::LocalMapMatch> MapMatcher::match_local_map(
-    const MapSnapshot& map, const std::vector<LandmarkId>& seeds, Frame& frame) const {
+    const MapSnapshot& map, const std::vector<LandmarkId>& seeds, Frame& frame) {
   const LocalMap local = make_local_map(map, seeds, options_.local_map);
   if (!local.reference.valid()) {
     return std::nullopt;

@@ -89,8 +89,7 @@ class MapMatcher {
   // optimises. None where the pose is not believed, or where nothing is around: then the frame's
   // keypoints are as before, its pose and its landmarks are those that were not believed.
   std::optional<LocalMapMatch> match_local_map(const MapSnapshot& map,
-                                               const std::vector<LandmarkId>& seeds,
-                                               Frame& frame) const;
+                                               const std::vector<LandmarkId>& seeds, Frame& frame);
 
   // Finds the frame without a prediction, in the first of `keyframes` that shows it, or else
   // anywhere in the map: in the keyframes that look most like it, or in the newest ones where there
@@ -108,7 +107,10 @@ class MapMatcher {
                     int new_points) const;
 
   // The frame becomes a keyframe: its image can serve as a reference.
-  void remember_keyframe(const Frame& frame) { refiner_.remember(frame); }
+  void remember_keyframe(const MapSnapshot& map, const Frame& frame) {
+    refiner_.forget_culled(map);
+    refiner_.remember(frame);
+  }
 
   // See TrackRefiner.
   void learn_shading(const MapSnapshot& map, const Frame& frame) {

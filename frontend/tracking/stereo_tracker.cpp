@@ -313,8 +313,8 @@ bool StereoTracker::track_keyframes(Frame& frame, const MapSnapshot& map) const 
 }
 
 // None if the pose is not believed.
-std::optional<MapMatcher::LocalMapMatch> StereoTracker::track_local_map(
-    Frame& frame, const MapSnapshot& map) const {
+std::optional<MapMatcher::LocalMapMatch> StereoTracker::track_local_map(Frame& frame,
+                                                                        const MapSnapshot& map) {
   std::vector<LandmarkId> seeds = valid_ids(frame.landmarks);
   if (seeds.empty() && last_.known()) {
     seeds = valid_ids(last_.frame().landmarks);
@@ -333,7 +333,7 @@ TrackedFrame StereoTracker::remember(const MapSnapshot& map, Frame frame, Tracke
   }
   if (result.keyframe) {
     chain_.begin();
-    matcher_.remember_keyframe(frame);
+    matcher_.remember_keyframe(map, frame);
   }
   untracked_ = result.tracked() ? std::nullopt : std::optional(frame);
   last_.remember(std::move(frame), result);

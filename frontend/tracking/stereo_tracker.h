@@ -97,8 +97,7 @@ class StereoTracker {
                                                     const Frame& frame) const;
   bool track_last_frame(Frame& frame, const MapSnapshot& map, TrackedFrame& result) const;
   bool track_keyframes(Frame& frame, const MapSnapshot& map) const;
-  std::optional<MapMatcher::LocalMapMatch> track_local_map(Frame& frame,
-                                                           const MapSnapshot& map) const;
+  std::optional<MapMatcher::LocalMapMatch> track_local_map(Frame& frame, const MapSnapshot& map);
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
   NewKeyframe make_keyframe(const Frame& frame, const MapSnapshot& map, KeyframeId reference) const;
   void learn_moving(const LadderStep& step, const Frame& frame);

@@ -94,6 +94,14 @@ void TrackRefiner::remember(const Frame& frame) {
   }
 }
 
+void TrackRefiner::forget_culled(const MapSnapshot& map) {
+  if (camera_id_.value >= map.camera_count()) return;
+  const std::int64_t taken_in = map.newest_frame_index(camera_id_);  // later ones are on their way
+  for (auto& [index, image] : images_) {
+    if (index <= taken_in && map.find_frame(camera_id_, index) == nullptr) image.reset();
+  }
+}
+
 const ImagePyramid* TrackRefiner::image_of(std::int64_t frame_index) const {
   const auto at =
       std::lower_bound(images_.begin(), images_.end(), frame_index,
@@ -122,8 +130,23 @@ bool TrackRefiner::find_reference(const MapSnapshot& map, const Landmark& landma
   return false;
 }
 
+// The patch around a reference, made anew unless the last frame had it. Goes to `patches`.
+const std::optional<ReferencePatch>& TrackRefiner::patch_of(const Reference& reference,
+                                                            Patches& patches) {
+  const Keypoint& at = *reference.keypoint;
+  const PatchKey key(reference.keyframe->observations->frame_index, at.x, at.y, at.scale);
+  auto kept = patches_.extract(key);
+  if (!kept.empty()) return patches.insert(std::move(kept)).position->second;
+  const auto [place, is_new] = patches.try_emplace(key);
+  if (is_new) {
+    place->second = make_reference_patch(*reference.image, double{at.x}, double{at.y},
+                                         double{at.scale}, options_.alignment);
+  }
+  return place->second;
+}
+
 bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landmark,
-                                   std::size_t index, Frame& frame) const {
+                                   std::size_t index, Frame& frame, Patches& patches) {
   Reference reference;
   if (!find_reference(map, landmark, reference)) {
     return false;
@@ -141,11 +164,9 @@ bool TrackRefiner::refine_keypoint(const MapSnapshot& map, const Landmark& landm
   }
   const Eigen::Vector2d center(reference.keypoint->x, reference.keypoint->y);
   const auto warp = patch_warp(camera_, target_from_reference, center, point_in_reference);
-  const auto patch = make_reference_patch(*reference.image, center.x(), center.y(),
-                                          reference.keypoint->scale, options_.alignment);
-  if (!warp || !patch) {
-    return false;
-  }
+  if (!warp) return false;
+  const auto& patch = patch_of(reference, patches);
+  if (!patch) return false;
   Keypoint& keypoint = frame.features.left.keypoints[index];
   const Alignment aligned = align_patch(
       *patch, *frame.image, *warp, Eigen::Vector2d(keypoint.x, keypoint.y), options_.alignment);
@@ -180,17 +201,19 @@ Eigen::Vector2d TrackRefiner::shading_shift(const Rigid3d& target_from_reference
   return ground && seen ? Eigen::Vector2d(*ground - *seen) : Eigen::Vector2d::Zero();
 }
 
-int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) const {
+int TrackRefiner::refine(const MapSnapshot& map, Frame& frame) {
   frame.aligned.clear();
   if (!options_.enabled || !frame.image) {
     return 0;
   }
+  Patches patches;
   for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {
     const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
-    if (landmark != nullptr && refine_keypoint(map, *landmark, i, frame)) {
+    if (landmark != nullptr && refine_keypoint(map, *landmark, i, frame, patches)) {
       frame.aligned.push_back(i);
     }
   }
+  patches_ = std::move(patches);
   return static_cast<int>(frame.aligned.size());
 }
 

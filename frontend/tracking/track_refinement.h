@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "backend/map/map_snapshot.h"
@@ -43,13 +45,16 @@ class TrackRefiner {
   // The frame becomes a keyframe: its image can serve as reference.
   void remember(const Frame& frame);
 
+  // Lets go of the images of keyframes that were culled: a vehicle that hovers makes many.
+  void forget_culled(const MapSnapshot& map);
+
   // Looks at a tracked frame for what its tracks tell of the shading, if it is far enough from the
   // last one that was looked at for its tracks to be others.
   void learn_shading(const MapSnapshot& map, const Frame& frame);
 
   // Aligns the frame's matched keypoints, given a pose good to about a pixel. Changes their
   // positions, right coordinates and standard deviations. Returns how many.
-  int refine(const MapSnapshot& map, Frame& frame) const;
+  int refine(const MapSnapshot& map, Frame& frame);
 
   // What aligned positions are off by besides; null: nothing.
   void use_floor(std::shared_ptr<const NoiseFloor> floor) { floor_ = std::move(floor); }
@@ -63,11 +68,16 @@ class TrackRefiner {
  private:
   struct Reference;
 
+  // Of which image a patch is, and around what.
+  using PatchKey = std::tuple<std::int64_t, float, float, float>;  // frame index, x, y, scale
+  using Patches = std::map<PatchKey, std::optional<ReferencePatch>>;
+
   const ImagePyramid* image_of(std::int64_t frame_index) const;
   bool is_news(const MapSnapshot& map, const Frame& frame) const;
   bool find_reference(const MapSnapshot& map, const Landmark& landmark, Reference& reference) const;
   bool refine_keypoint(const MapSnapshot& map, const Landmark& landmark, std::size_t index,
-                       Frame& frame) const;
+                       Frame& frame, Patches& patches);
+  const std::optional<ReferencePatch>& patch_of(const Reference& reference, Patches& patches);
   Eigen::Vector2d shading_shift(const Rigid3d& target_from_reference,
                                 const Eigen::Vector3d& point_in_reference, double scale) const;
 
@@ -80,7 +90,8 @@ class TrackRefiner {
   std::shared_ptr<const NoiseFloor> floor_;
   std::optional<Eigen::Vector3d> learnt_at_;  // where the last frame that was looked at stood
   std::deque<std::pair<std::int64_t, std::shared_ptr<const ImagePyramid>>>
-      images_;  // by frame index, ascending
+      images_;       // by frame index, ascending; null where the keyframe was culled
+  Patches patches_;  // that the last frame was aligned with: the next mostly needs the same
 };
 
 }  // namespace hybrid_slam

@@ -1,8 +1,11 @@
 // What a frame costs as the map grows, feature by feature simulated, every frame a keyframe: wall
-// time of one thread, so run it on a machine that does nothing else.
+// time of one thread, so run it on a machine that does nothing else; and what memory is in use.
+//   map_growth [KEYFRAMES]
+#include <malloc.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <string_view>
 #include <vector>
 
@@ -31,23 +34,35 @@ double median_around(const std::vector<double>& values, std::size_t middle) {
   return window[window.size() / 2];
 }
 
-void print_growth() {
-  const SimulatedSource source(make_synthetic_scene(long_corridor()));
+double megabytes_in_use() {
+  const struct mallinfo2 info = mallinfo2();
+  return static_cast<double>(info.uordblks + info.hblkhd) / 1e6;
+}
+
+void print_growth(int keyframes) {
+  SyntheticSceneOptions corridor = long_corridor();
+  corridor.landmarks = corridor.landmarks * keyframes / corridor.times;
+  corridor.times = keyframes + static_cast<int>(kHalfWindow) + 1;
+  const SimulatedSource source(make_synthetic_scene(corridor));
+  std::vector<double> memory;  // after each frame
+  ReplayHooks hooks;
+  hooks.frame = [&](const FrameResult&) { memory.push_back(megabytes_in_use()); };
   const RunResult result =
-      run_every_frame(source, keyframe_each_frame(), simulated_run(source), {});
-  std::printf("frames %zu, keyframes %zu, landmarks %zu\nkeyframes  track [ms]  find_loop [ms]\n",
+      run_every_frame(source, keyframe_each_frame(), simulated_run(source), hooks);
+  std::printf("frames %zu, keyframes %zu, landmarks %zu\n",
               static_cast<std::size_t>(result.frames.read), result.map->keyframe_count(),
               result.map->landmark_count());
-  for (const std::size_t at : {200u, 500u, 1000u, 1500u, 2000u}) {
-    std::printf("%9zu  %10.2f  %14.2f\n", at, median_around(stage(result, "track"), at),
-                median_around(stage(result, "find_loop"), at));
+  std::printf("keyframes  track [ms]  find_loop [ms]  in use [MB]\n");
+  for (std::size_t at = 500; at < memory.size(); at += 500) {
+    std::printf("%9zu  %10.2f  %14.2f  %11.1f\n", at, median_around(stage(result, "track"), at),
+                median_around(stage(result, "find_loop"), at), memory[at]);
   }
 }
 
 }  // namespace
 }  // namespace hybrid_slam
 
-int main() {
-  hybrid_slam::print_growth();
+int main(int argc, char** argv) {
+  hybrid_slam::print_growth(argc > 1 ? std::atoi(argv[1]) : 2000);
   return 0;
 }

@@ -2,7 +2,8 @@
 // in memory, at a rate, and says how long it took until the observer had the frame, and what push()
 // itself cost.
 //   session_latency DATASET SEQUENCE stereo|hybrid RATE [FRAMES [SOAK_MINUTES]]
-// With SOAK_MINUTES the sequence runs there and back for so long, and the memory is said.
+// With SOAK_MINUTES the sequence runs there and back for so long, and the memory is said: what is
+// resident, and what of it is in use, which is not blurred by what the allocator keeps.
 #include <malloc.h>
 #include <unistd.h>
 
@@ -38,6 +39,11 @@ double resident_mb() {
   std::size_t resident = 0;
   std::ifstream("/proc/self/statm") >> size >> resident;
   return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+double allocated_mb() {
+  const struct mallinfo2 info = mallinfo2();
+  return static_cast<double>(info.uordblks + info.hblkhd) / 1e6;
 }
 
 void print(const char* name, std::vector<double> values) {
@@ -115,8 +121,9 @@ int run(const std::string& dataset, const std::string& name, bool hybrid, double
     push(StereoImages{time, one.left, one.right});
     if (hybrid) push(FisheyeImage{time, one.fisheye});
     if (soak_minutes > 0 && i % static_cast<std::size_t>(60 * rate) == 0) {
-      std::printf("%5.1f min %8.1f MB, %zu keyframes, %zu landmarks\n", due.count() / 60,
-                  resident_mb(), session.map()->keyframe_count(), session.map()->landmark_count());
+      std::printf("%5.1f min %8.1f MB, %8.2f in use, %zu keyframes, %zu landmarks\n",
+                  due.count() / 60, resident_mb(), allocated_mb(), session.map()->keyframe_count(),
+                  session.map()->landmark_count());
       std::fflush(stdout);
     }
   }

@@ -135,6 +135,26 @@ TEST_CASE("Matched keypoints move to where their landmark's first view looks the
   CHECK(refined_error(options) < 0.05);
 }
 
+TEST_CASE("Patches that are kept from the frame before change no position") {
+  Wall wall;
+  TrackRefiner fresh(wall.camera_id, camera(), {});
+  TrackRefiner used(wall.camera_id, camera(), {});
+  fresh.remember(wall.first);
+  used.remember(wall.first);
+  Frame before = wall.second;  // shows every third landmark
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (i % 3 != 0) before.landmarks[i] = LandmarkId();
+  }
+  CHECK(used.refine(wall.map.view(), before) > 10);
+  Frame expected = wall.second;
+  CHECK(fresh.refine(wall.map.view(), expected) == used.refine(wall.map.view(), wall.second));
+  CHECK(expected.aligned == wall.second.aligned);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    CHECK(expected.features.left.keypoints[i].x == wall.second.features.left.keypoints[i].x);
+    CHECK(expected.features.left.keypoints[i].y == wall.second.features.left.keypoints[i].y);
+  }
+}
+
 // A frame of another place, with a single track: it tells nothing, but what comes then is news.
 Frame elsewhere(Frame frame) {
   frame.cam_from_world = Rigid3d(Eigen::Quaterniond::Identity(), {kDepth, 0, 0});
@@ -185,7 +205,7 @@ TEST_CASE("What moving lamps pretend is learnt from frames apart and taken out")
 
 TEST_CASE("Without the image of a first view nothing moves") {
   Wall wall;
-  const auto unchanged = [&](const TrackRefiner& refiner) {
+  const auto unchanged = [&](TrackRefiner refiner) {
     const std::vector<Keypoint> before = wall.second.features.left.keypoints;
     CHECK(refiner.refine(wall.map.view(), wall.second) == 0);
     for (std::size_t i = 0; i < before.size(); ++i) {
@@ -206,6 +226,37 @@ TEST_CASE("Without the image of a first view nothing moves") {
   TrackRefiner disabled(wall.camera_id, camera(), off);
   disabled.remember(wall.first);
   unchanged(disabled);
+}
+
+TEST_CASE(
+    "Images of keyframes that were culled are let go, of those to come and of the others not") {
+  Wall wall;
+  TrackRefiner refiner(wall.camera_id, camera(), {});
+  std::vector<std::weak_ptr<const ImagePyramid>> images;
+  for (const std::int64_t index : {0, 1, 2}) {
+    Frame frame = wall.first;
+    frame.index = index;
+    frame.image = std::make_shared<const ImagePyramid>(*wall.first.image);
+    images.push_back(frame.image);
+    refiner.remember(frame);
+  }
+  const auto kept = [&] {
+    refiner.forget_culled(wall.map.view());
+    std::vector<bool> alive;
+    for (const auto& image : images) alive.push_back(!image.expired());
+    return alive;
+  };
+  CHECK(kept() == std::vector<bool>{true, true, true});  // 1 and 2 are not in the map yet
+  auto observations = std::make_shared<FrameObservations>(
+      *wall.map.view().at(wall.map.view().origin()).observations);
+  observations->frame_index = 1;
+  const KeyframeId second =
+      wall.map.add_keyframe({observations, Rigid3d(), wall.second.landmarks, {}, {}});
+  CHECK(kept() == std::vector<bool>{true, true, true});
+  MapEdit culled;
+  culled.erased_keyframes = {second};
+  wall.map.apply(culled);
+  CHECK(kept() == std::vector<bool>{true, false, true});
 }
 
 }  // namespace
