@@ -36,7 +36,11 @@ class EveryFrameCore final : public SlamCore {
     if (checkpoints_.due()) save();
   }
 
-  void finish(bool) override {}
+  void finish(bool) override {
+    mapping_.conclude(tracking_.take_counts());
+    publish();
+  }
+
   std::shared_ptr<const MapSnapshot> map() const override { return snapshots_.get(); }
   StageTimes times() const override { return times_; }
 

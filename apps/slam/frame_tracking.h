@@ -28,6 +28,9 @@ class FrameTracking {
   std::optional<MappingJob> track(CameraFrame frame, const MapSnapshot& map,
                                   bool allow_keyframe = true);
 
+  // What was counted since the last frame that became a keyframe; begins anew.
+  std::vector<LandmarkCount> take_counts() { return counts_.take(); }
+
   // The words of the map's keyframes, which follow it: for use in the same thread. Who has found
   // them already assigns them before track(), which else does it.
   std::shared_ptr<KeyframeDatabase> places() const { return places_; }

@@ -128,4 +128,11 @@ void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& p
   take_in_full(std::move(result), backend_.closings(), times, publish);
 }
 
+void LocalMapping::conclude(const std::vector<LandmarkCount>& counts) {
+  MapEdit counted;
+  counted.counted = counts;
+  backend_.apply(counted);
+  backend_.apply(probation_.conclude(backend_.view()));
+}
+
 }  // namespace hybrid_slam

@@ -70,6 +70,10 @@ class LocalMapping {
   // The same at once, if the options want it for a map of this size.
   void adjust_full(StageTimes& times, const std::function<void()>& publish);
 
+  // What tracking counted since the last keyframe; nothing comes after it. Landmarks too young to
+  // have been judged are judged by that: what moves by itself would stay in the map otherwise.
+  void conclude(const std::vector<LandmarkCount>& counts);
+
   std::shared_ptr<const MapSnapshot> snapshot() { return backend_.snapshot(); }
   const Map& map() const { return backend_.map(); }
 

@@ -48,12 +48,9 @@ class RealtimeCore final : public SlamCore {
   void finish(bool cancelled) override {
     join(cancelled);
     mapping_.rethrow();
-    if (!loops_) return;
-    for (const std::string& failure : {loops_->failure(), full_bundle_->failure()}) {
-      if (!failure.empty()) observers_.failure({failure, true});
-    }
-    if (!cancelled) close_left_loops();
-    loop_closing_->finish();
+    if (loops_) end_loops(cancelled);
+    local_mapping_.conclude(tracking_.take_counts());
+    mapping_.publish();
   }
 
   std::shared_ptr<const MapSnapshot> map() const override { return mapping_.snapshot(); }
@@ -118,6 +115,14 @@ class RealtimeCore final : public SlamCore {
       observers_.map(map, MapChange::kFullBundle);
     };
     return events;
+  }
+
+  void end_loops(bool cancelled) {
+    for (const std::string& failure : {loops_->failure(), full_bundle_->failure()}) {
+      if (!failure.empty()) observers_.failure({failure, true});
+    }
+    if (!cancelled) close_left_loops();
+    loop_closing_->finish();
   }
 
   // What the threads left, in order; they have ended.

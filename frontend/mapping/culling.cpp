@@ -103,6 +103,20 @@ MapEdit LandmarkProbation::cull(const MapSnapshot& map, KeyframeId newest) {
   return edit;
 }
 
+MapEdit LandmarkProbation::conclude(const MapSnapshot& map) {
+  admit(map, previous_);
+  MapEdit edit;
+  for (const Recent& recent : recent_) {
+    const Landmark* landmark = map.find(recent.id);
+    if (landmark == nullptr) continue;
+    if (landmark->found - 1 < options_.min_found_ratio * (landmark->visible - 1)) {
+      edit.erased_landmarks.push_back(recent.id);
+    }
+  }
+  recent_.clear();
+  return edit;
+}
+
 std::vector<KeyframeId> KeyframeUse::gone_out(const MapSnapshot& map) {
   if (options_.full_keyframes == 0) return {};
   std::vector<KeyframeId> now;

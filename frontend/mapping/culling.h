@@ -30,6 +30,11 @@ class LandmarkProbation {
   // Called once per keyframe, right after it entered the map.
   MapEdit cull(const MapSnapshot& map, KeyframeId newest);
 
+  // Called once, at the end, when no keyframe will judge the youngest any more. The same share is
+  // asked of the frames since they were made: having been seen then proves nothing. Those that no
+  // frame was to show since stay.
+  MapEdit conclude(const MapSnapshot& map);
+
  private:
   struct Recent {
     LandmarkId id;

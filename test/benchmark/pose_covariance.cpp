@@ -21,6 +21,7 @@
 #include "apps/report/result_table.h"
 #include "cameras/geometry/uncertain_motion.h"
 #include "frontend/input/image_sequence.h"
+#include "frontend/input/trajectory_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -70,6 +71,13 @@ double nees(const ResultTable& table, std::size_t row, const Rigid3d& truth) {
   return squared_mahalanobis(ros_error(pose_at(table, row), truth), covariance_at(table, row)) / 6;
 }
 
+// A survey's truth has no rotation in its dataset's own format; the renderer's has it beside.
+Poses survey_truth(const nlohmann::json& summary) {
+  const std::filesystem::path dataset = summary.at("dataset").get<std::string>();
+  const auto inside = dataset / summary.at("sequence").get<std::string>();
+  return read_trajectory((exists(inside) ? inside : dataset) / "gt_left_tum.txt").poses;
+}
+
 // What a run says, and what is true.
 class Run {
  public:
@@ -77,8 +85,7 @@ class Run {
     const auto summary = nlohmann::json::parse(std::ifstream(folder / "summary.json"));
     const auto sequence = open_sequence(summary.at("dataset"), SequenceLayout::kAuto,
                                         summary.at("sequence"), SequenceCameras::kAuto);
-    if (!sequence->info().truth_has_rotation) throw InputError(folder.string() + ": no true poses");
-    left_ = sequence->info().truth;
+    left_ = sequence->info().truth_has_rotation ? sequence->info().truth : survey_truth(summary);
     fisheye_ = sequence->info().fisheye_truth;
     if (std::filesystem::exists(folder / "fisheye_in_left.csv")) {
       in_left_ = ResultTable(folder / "fisheye_in_left.csv");
@@ -119,7 +126,9 @@ class Run {
     for (std::size_t row = 0; row < frames_.size(); ++row) {
       const Poses& truth = frames_.text(row, "camera") == "stereo" ? left_ : fisheye_;
       const StampedPose* true_pose = find(truth, frames_.number(row, "time"));
-      if (frames_.text(row, "state") != "map" || !true_pose) continue;
+      // Where another component lies is not known, and it does not say that it was.
+      const bool placed = frames_.text(row, "component") == kOrigin;
+      if (frames_.text(row, "state") != "map" || !placed || !true_pose) continue;
       const Rigid3d in_map = map_from_truth() * true_pose->world_from_cam;
       const double off = (pose_at(frames_, row).translation() - in_map.translation()).norm();
       ++count.map;

@@ -82,6 +82,30 @@ TEST_CASE("Wrong matches do not bend a simulated corridor", "[integration]") {
   CHECK(position_error(result, source.scene()) < 0.003 * 60 * 0.4);  // of the path's length
 }
 
+TEST_CASE("What the last frames did not find again is not in the final map", "[integration]") {
+  SyntheticSceneOptions scene = orbit(60);
+  scene.times = 23;
+  scene.step = kOrbitLength / 60;
+  scene.outlier_rate = 0.2;
+  const SimulatedSource source(make_synthetic_scene(scene));
+  for (const bool realtime : {false, true}) {
+    INFO((realtime ? "realtime" : "every frame"));
+    const RunResult result =
+        (realtime ? run_realtime : run_every_frame)(source, slam_options(), {}, {}, {});
+    const MapSnapshot& map = *result.map;
+    const Keyframe& newest = *map.newest_keyframe(CameraId(0));
+    REQUIRE(newest.observations->frame_index < 22);  // frames came after it
+    int looked_for = 0;
+    for (const LandmarkId id : map.landmark_ids()) {
+      const Landmark& landmark = map.at(id);
+      if (landmark.reference != newest.id || landmark.visible == 1) continue;
+      ++looked_for;
+      CHECK(landmark.found > 1);
+    }
+    CHECK(looked_for > 50);
+  }
+}
+
 TEST_CASE("every-frame mode gives the same bits whatever the number of threads", "[integration]") {
   const SimulatedSource source(make_synthetic_scene(orbit(30)));
   ReplayOptions run;

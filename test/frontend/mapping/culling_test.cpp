@@ -144,6 +144,37 @@ TEST_CASE("Landmarks that mapping makes after the call are watched, too") {
   CHECK(values(edit.erased_landmarks) == std::vector<std::uint32_t>{3});
 }
 
+TEST_CASE("At the end the youngest landmarks are judged by the frames since they were made") {
+  ProbationMap made;
+  LandmarkProbation probation{CullingOptions()};
+  const KeyframeId first = made.add({}, {0, 1, 2, 3});
+  probation.cull(made.map.view(), first);
+  MapEdit edit;
+  edit.new_landmarks.push_back({{0.5, 0, 3}, {{first, 5}}});  // landmark 4, by mapping
+  // Landmark 3 is not in view any more.
+  edit.counted = {{LandmarkId(0), 1, 0}, {LandmarkId(1), 4, 1}, {LandmarkId(2), 5, 1}};
+  made.map.apply(edit);
+  MapEdit counts;
+  counts.counted = {{LandmarkId(4), 1, 0}};
+  made.map.apply(counts);
+  const MapEdit end = probation.conclude(made.map.view());
+  CHECK(values(end.erased_landmarks) == std::vector<std::uint32_t>{0, 2, 4});
+  made.map.apply(end);
+  CHECK(made.map.check_consistency().empty());
+  CHECK(probation.conclude(made.map.view()).empty());
+}
+
+TEST_CASE("At the end landmarks that were judged before are not judged again") {
+  ProbationMap made;
+  LandmarkProbation probation{CullingOptions()};
+  probation.cull(made.map.view(), made.add({}, all_points()));
+  for (int i = 0; i < 3; ++i) probation.cull(made.map.view(), made.add(all_points(), {}));
+  MapEdit counts;
+  counts.counted = {{LandmarkId(0), 100, 0}};
+  made.map.apply(counts);
+  CHECK(probation.conclude(made.map.view()).empty());
+}
+
 // Eight views of the same ground from nearly the same place.
 FilledMap hover_map() {
   SyntheticSceneOptions options;
