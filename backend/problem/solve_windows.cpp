@@ -93,18 +93,21 @@ class Window {
   std::vector<std::uint32_t> point_in_part_;
 };
 
+// Sweeps over the graph, up and down in turn, end with one that gains less than this part of the
+// cost: what is left is some times as much, and below a percent.
+constexpr double kSettled = 1e-3;
+constexpr int kMostSweeps = 10;
+
 bool is_complete(SolveEnd end) {
   return end == SolveEnd::kConverged || end == SolveEnd::kIterationLimit;
 }
 
-// Where windows begin: up the graph, and down again.
+// Where windows begin, up the graph.
 std::vector<std::size_t> beginnings(std::size_t all, std::size_t frames) {
   const std::size_t step = std::max<std::size_t>(1, frames / 2);
   std::vector<std::size_t> up{0};
   while (up.back() + frames < all) up.push_back(up.back() + step);
-  std::vector<std::size_t> result = up;
-  result.insert(result.end(), up.rbegin() + 1, up.rend());
-  return result;
+  return up;
 }
 
 void add(const GraphSummary& window, GraphSummary& sum) {
@@ -145,6 +148,33 @@ void add_costs(const std::vector<double>& values, const std::vector<char>& is_ou
 
 }  // namespace
 
+namespace {
+
+// Windows one after the other. Returns by which part that lowered the cost of what they have.
+double solve_one_by_one(FactorGraph& graph, const std::vector<std::size_t>& order,
+                        std::size_t frames, const ProblemOptions& options,
+                        const std::stop_token& stop, std::vector<char>& is_outlier,
+                        GraphSummary& summary) {
+  double before = 0;
+  double after = 0;
+  for (const std::size_t first : order) {
+    Window window(graph, first, first + frames);
+    const GraphSummary solved = solve_graph(window.part(), options, stop);
+    window.write_back(graph);
+    add(solved, summary);
+    before += solved.kept_initial_cost;
+    after += solved.kept_final_cost;
+    if (is_complete(solved.end)) {
+      for (const std::uint32_t i : window.observations()) is_outlier[i] = 0;
+      for (const std::uint32_t i : solved.outliers) is_outlier[window.observations()[i]] = 1;
+    }
+    if (solved.end == SolveEnd::kStopped) break;
+  }
+  return before > 0 ? (before - after) / before : 0;
+}
+
+}  // namespace
+
 GraphSummary solve_windows(FactorGraph& graph, std::size_t frames, const ProblemOptions& options,
                            const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
@@ -159,16 +189,12 @@ GraphSummary solve_windows(FactorGraph& graph, std::size_t frames, const Problem
   const std::vector<double> before = squared_residuals(graph);
   const double edges_before = edges_cost(graph);
   std::vector<char> is_outlier(graph.observations.size(), 0);
-  for (const std::size_t first : beginnings(graph.frames.size(), frames)) {
-    Window window(graph, first, first + frames);
-    const GraphSummary solved = solve_graph(window.part(), options, stop);
-    window.write_back(graph);
-    add(solved, summary);
-    if (is_complete(solved.end)) {
-      for (const std::uint32_t i : window.observations()) is_outlier[i] = 0;
-      for (const std::uint32_t i : solved.outliers) is_outlier[window.observations()[i]] = 1;
-    }
-    if (solved.end == SolveEnd::kStopped) break;
+  std::vector<std::size_t> order = beginnings(graph.frames.size(), frames);
+  const int sweeps = order.size() > 1 ? kMostSweeps : 1;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    const double gain = solve_one_by_one(graph, order, frames, options, stop, is_outlier, summary);
+    if (summary.end == SolveEnd::kStopped || (sweep > 0 && gain < kSettled)) break;
+    std::reverse(order.begin(), order.end());
   }
   const std::vector<double> after = squared_residuals(graph);
   summary.initial_cost = summary.kept_initial_cost = edges_before;
