@@ -10,7 +10,7 @@ FullBundleWorker::FullBundleWorker(const FullBundleOptions& options, MappingWork
     : options_(options), mapping_(mapping), thread_([this] { work(); }) {}
 
 void FullBundleWorker::adjust(std::shared_ptr<const MapSnapshot> map, std::size_t loops_closed) {
-  if (!wants_full_bundle(*map, options_)) {
+  if (!options_.enabled) {
     return;
   }
   requests_.publish(std::make_shared<const Request>(Request{std::move(map), loops_closed}));

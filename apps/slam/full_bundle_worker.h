@@ -19,7 +19,7 @@ class FullBundleWorker {
   FullBundleWorker(const FullBundleOptions& options, MappingWorker& mapping);
   ~FullBundleWorker() { finish(true); }
 
-  // A loop was closed: adjust this map, if the options want it for one of this size. What is being
+  // A loop was closed: adjust this map, if the options want it. What is being
   // adjusted is completed first; of maps that come meanwhile, the last. Never waits.
   void adjust(std::shared_ptr<const MapSnapshot> map, std::size_t loops_closed);
 

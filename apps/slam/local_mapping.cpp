@@ -94,7 +94,7 @@ void LocalMapping::take_offset_out(const MappingJob& job) {
   const double disparity = median_disparity(seen.features, seen.u_right);
   if (by == 0 || !(disparity > 0) || most < kDoubtfulScale * disparity) return;
   backend_.shift_disparities(seen.camera, by);
-  if (wants_full_bundle(backend_.view(), options_.backend.full)) backend_.optimize_full();
+  if (options_.backend.full.enabled) backend_.optimize_full();
   disparity_offset_ = job.disparity_offset;
 }
 
@@ -121,7 +121,7 @@ void LocalMapping::take_in_full(BundleResult result, std::size_t closings_then, 
 }
 
 void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& publish) {
-  if (!wants_full_bundle(backend_.view(), options_.backend.full)) return;
+  if (!options_.backend.full.enabled) return;
   StageClock clock(times);
   BundleResult result = solve_full(backend_.view(), options_.backend.full);
   clock.lap("full_bundle");

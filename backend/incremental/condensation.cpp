@@ -32,6 +32,13 @@ Eigen::VectorXd IncrementalSolver::deltas_of(const std::vector<std::uint32_t>& p
   return deltas;
 }
 
+std::vector<Eigen::Vector3d> IncrementalSolver::places_of(
+    const std::vector<std::uint32_t>& poses) const {
+  std::vector<Eigen::Vector3d> places;
+  for (const std::uint32_t pose : poses) places.push_back(pose_with(pose).tangent.place);
+  return places;
+}
+
 // How far a view of each pose is, in standard deviations of an observation, from what it would be
 // if the poses had moved together since they had these deltas. A turn by t moves what is seen by
 // |derivative| t, and by a part t of that in second order; a way counts by the turn that it looks
@@ -82,7 +89,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_
 LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t member) const {
   const CondensedTerm::Member& of = term.members[member];
   LandmarkTerm landmark;
-  landmark.base = inverse(pose_at(of.anchor)) * of.in_anchor;
+  landmark.base = inverse(pose_at(of.anchor)) * of.in_anchor.cast<double>();
   const std::size_t end =
       member + 1 < term.members.size() ? term.members[member + 1].first : term.observations.size();
   for (std::size_t k = of.first; k < end; ++k) {
@@ -119,7 +126,7 @@ LandmarkTerm IncrementalSolver::linearized_landmark(std::uint32_t point) const {
 Eigen::Vector3d IncrementalSolver::condensed_point(std::uint32_t point) const {
   const CondensedTerm& term = condensed_[condensed_in_[point]];
   const CondensedTerm::Member& of = term.members[member_of(point)];
-  if (!term.is_stale) return inverse(pose_at(of.anchor)) * of.in_anchor;
+  if (!term.is_stale) return inverse(pose_at(of.anchor)) * of.in_anchor.cast<double>();
   const LandmarkTerm landmark = linearized_landmark(point);
   if (!landmark.solvable) return landmark.base;
   return landmark.base + displacement(landmark);
@@ -135,7 +142,7 @@ void IncrementalSolver::place(std::uint32_t point) {
     linearize(landmark, landmark.base);
     if (!landmark.solvable) continue;
     CondensedTerm::Member& of = term.members[i];
-    of.in_anchor = pose_at(of.anchor) * (landmark.base + displacement(landmark));
+    of.in_anchor = (pose_at(of.anchor) * (landmark.base + displacement(landmark))).cast<float>();
   }
   term.placed = deltas_of(term.poses);
   term.is_stale = false;
@@ -157,13 +164,15 @@ double IncrementalSolver::linearize_condensed(std::uint32_t index) {
       costs.push_back(0);
     }
   }
+  std::vector<const LandmarkTerm*> members;
+  for (const LandmarkTerm& landmark : landmarks) members.push_back(&landmark);
   term.begin(poses, deltas_of(poses));
+  term.add(members, costs, places_of(poses));
   double cost = 0;
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    term.add(landmarks[i], costs[i]);
     cost += costs[i];
     CondensedTerm::Member& of = term.members[i];
-    of.in_anchor = pose_at(of.anchor) * landmarks[i].base;
+    of.in_anchor = (pose_at(of.anchor) * landmarks[i].base).cast<float>();
   }
   return cost;
 }
@@ -274,6 +283,13 @@ void IncrementalSolver::condense(std::vector<std::uint32_t> points,
   std::sort(points.begin(), points.end());
   CondensedTerm made;
   made.begin(poses, deltas_of(poses));
+  std::vector<const LandmarkTerm*> landmarks;
+  std::vector<double> costs;
+  for (const std::uint32_t point : points) {
+    landmarks.push_back(landmarks_[point].get());
+    costs.push_back(terms_[landmark_terms_[point]].cost);
+  }
+  made.add(landmarks, costs, places_of(poses));
   for (const std::uint32_t point : points) {
     const std::uint32_t id = landmark_terms_[point];
     const LandmarkTerm& landmark = *landmarks_[point];
@@ -281,10 +297,9 @@ void IncrementalSolver::condense(std::vector<std::uint32_t> points,
     member.landmark = point;
     member.first = static_cast<std::uint32_t>(made.observations.size());
     member.anchor = landmark.poses.front();
-    member.in_anchor = pose_at(member.anchor) * this->point(point);
+    member.in_anchor = (pose_at(member.anchor) * this->point(point)).cast<float>();
     made.members.push_back(member);
     for (const LandmarkView& view : landmark.views) made.observations.push_back(view.observation);
-    made.add(landmark, terms_[id].cost);
     for (const std::uint32_t v : all_variables(landmark)) unlink(v, id);
     forget_sums(id);
     landmarks_[point].reset();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "backend/incremental/landmark_term.h"
@@ -21,7 +22,7 @@ struct CondensedTerm {
     std::uint32_t landmark = 0;
     std::uint32_t first = 0;   // of its observations; the next member's first is behind the last
     std::uint32_t anchor = 0;  // a pose's variable that carries the point along
-    Eigen::Vector3d in_anchor = Eigen::Vector3d::Zero();
+    Eigen::Vector3f in_anchor = Eigen::Vector3f::Zero();
   };
 
   // What a view says about its pose, in squares, summed up: by a turn [1/rad^2], by a way [1/m^2].
@@ -35,11 +36,13 @@ struct CondensedTerm {
   std::vector<std::uint32_t> observations;
   std::vector<std::uint32_t> poses;  // that vary
   bool is_held = false;              // by a view of a fixed pose
-  std::vector<double> information;   // H: blocks (i, j) with j <= i, 6 x 6, one after the other
-  Eigen::VectorXd gradient;          // at `at`
-  Eigen::VectorXd at;                // the poses' deltas when it was made
-  double squared_norm = 0;           // likewise: of the weighted residuals
-  double loss_excess = 0;            // what the losses make of that, beyond it
+  // H: blocks (i, i), and (i, j) with j < i, row after row.
+  std::vector<Matrix6d> own;
+  std::vector<Eigen::Matrix<float, 6, 6>> shared;
+  Eigen::VectorXd gradient;  // at `at`
+  Eigen::VectorXd at;        // the poses' deltas when it was made
+  double squared_norm = 0;   // likewise: of the weighted residuals
+  double loss_excess = 0;    // what the losses make of that, beyond it
   int rows = 0;
   std::vector<Reach> reach;  // by pose
   Eigen::VectorXd placed;    // the poses' deltas when the members' points were minimised
@@ -48,8 +51,10 @@ struct CondensedTerm {
   // Empties what sums up, for these poses with these deltas.
   void begin(std::vector<std::uint32_t> poses, Eigen::VectorXd deltas);
 
-  // Adds a landmark's linearisation. `cost`: twice, with its losses, there.
-  void add(const LandmarkTerm& landmark, double cost);
+  // Adds landmarks' linearisations. `costs`: twice, with their losses, there. `places`: of the
+  // poses' tangents.
+  void add(std::span<const LandmarkTerm* const> landmarks, std::span<const double> costs,
+           std::span<const Eigen::Vector3d> places);
 
   // H v.
   Eigen::VectorXd times(const Eigen::VectorXd& v) const;
@@ -57,9 +62,14 @@ struct CondensedTerm {
   void assemble(Front& front) const;
 
  private:
+  // The blocks (i, j) with j < i while they are summed up.
+  using Sums = std::vector<Matrix6d>;
+
   std::size_t slot(std::uint32_t pose) const;
-  Eigen::Map<Matrix6d> block(std::size_t i, std::size_t j);
-  Eigen::Map<const Matrix6d> block(std::size_t i, std::size_t j) const;
+  static std::size_t place_of(std::size_t i, std::size_t j) { return i * (i - 1) / 2 + j; }
+  Matrix6d shared_block(std::size_t i, std::size_t j) const;
+  void add(const LandmarkTerm& landmark, double cost, Sums& sums);
+  void keep(const Sums& sums, std::span<const Eigen::Vector3d> places);
 };
 
 }  // namespace hybrid_slam

@@ -18,7 +18,7 @@ FactorGraph IncrementalSolver::graph() const {
   }
   for (std::uint32_t i = 0; i < landmarks_.size(); ++i) graph.points.push_back({point(i), false});
   for (std::size_t i = 0; i < observations_.size(); ++i) {
-    if (observation_there_[i] != 0) graph.observations.push_back(observations_[i]);
+    if (observation_there_[i] != 0) graph.observations.push_back(observations_[i].given());
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     if (edge_there_[i] != 0) graph.edges.push_back(edges_[i]);

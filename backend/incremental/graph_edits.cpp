@@ -157,7 +157,9 @@ std::uint32_t IncrementalSolver::add_observation(const GraphObservation& observa
   const Camera& camera = item(cameras_, pose.camera, "camera");
   refuse(measurement_fault(observation, camera), "observation");
   const std::uint32_t index = free_observation();
-  observations_[index] = observation;
+  observations_[index] = {observation.frame, observation.point,
+                          observation.measurement.cast<float>(),
+                          static_cast<float>(observation.sigma)};
   observation_there_[index] = 1;
   LandmarkTerm& landmark = live(observation.point);
   LandmarkView view;
@@ -222,7 +224,7 @@ std::uint32_t IncrementalSolver::free_edge() {
 
 void IncrementalSolver::remove_observation(std::uint32_t observation) {
   if (item(observation_there_, observation, "observation") == 0) return;
-  const GraphObservation& removed = observations_[observation];
+  const Seen& removed = observations_[observation];
   LandmarkTerm& landmark = live(removed.point);
   observation_there_[observation] = 0;
   const std::uint32_t term = landmark_terms_[removed.point];

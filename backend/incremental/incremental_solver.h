@@ -149,6 +149,17 @@ class IncrementalSolver final : private TermSource {
     std::vector<std::uint32_t> dormant;  // of a fixed one: all its terms
   };
 
+  // A GraphObservation in single precision: a hundred-thousandth of a pixel is no measurement, and
+  // observations are most of what a survey is.
+  struct Seen {
+    std::uint32_t frame = 0;
+    std::uint32_t point = 0;
+    Eigen::Vector3f measurement = Eigen::Vector3f::Zero();
+    float sigma = 1;
+
+    GraphObservation given() const { return {frame, point, measurement.cast<double>(), sigma}; }
+  };
+
   struct Pose {
     std::uint32_t variable = 0;
     WorldTangent tangent;
@@ -274,6 +285,7 @@ class IncrementalSolver final : private TermSource {
   LandmarkTerm& live(std::uint32_t point);
   double linearize_condensed(std::uint32_t index);
   Eigen::VectorXd deltas_of(const std::vector<std::uint32_t>& poses) const;
+  std::vector<Eigen::Vector3d> places_of(const std::vector<std::uint32_t>& poses) const;
   std::vector<double> shape_change(const CondensedTerm& term, const Eigen::VectorXd& since) const;
   LandmarkTerm taken_out(const CondensedTerm& term, std::size_t member) const;
   std::size_t member_of(std::uint32_t point) const;
@@ -306,7 +318,7 @@ class IncrementalSolver final : private TermSource {
   std::vector<Camera> cameras_;
   std::vector<Pose> poses_;
   std::vector<Term> terms_;
-  std::deque<GraphObservation> observations_;  // grows without being copied
+  std::deque<Seen> observations_;  // grows without being copied
   std::vector<char> observation_there_;
   std::vector<std::unique_ptr<LandmarkTerm>> landmarks_;  // none of those that are condensed
   std::vector<char> point_there_;

@@ -77,15 +77,15 @@ double IncrementalSolver::linearize_edge(std::uint32_t index) {
 bool IncrementalSolver::reproject(std::uint32_t observation, const Rigid3d& cam_from_world,
                                   const Eigen::Vector3d& point, double* residual, double* d_pose,
                                   double* d_point) const {
-  const GraphObservation& seen = observations_[observation];
-  return camera_reprojection_residual(cameras_[poses_[seen.frame].camera],
-                                      cam_from_world.params.data(), point.data(), seen.measurement,
-                                      seen.sigma, residual, d_pose, d_point);
+  const Seen& seen = observations_[observation];
+  return camera_reprojection_residual(
+      cameras_[poses_[seen.frame].camera], cam_from_world.params.data(), point.data(),
+      seen.measurement.cast<double>(), seen.sigma, residual, d_pose, d_point);
 }
 
 int IncrementalSolver::rows_of_observation(std::uint32_t observation) const {
-  const GraphObservation& seen = observations_[observation];
-  return reprojection_rows(cameras_[poses_[seen.frame].camera], seen.measurement);
+  const Seen& seen = observations_[observation];
+  return reprojection_rows(cameras_[poses_[seen.frame].camera], seen.measurement.cast<double>());
 }
 
 bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkView& view,
@@ -223,7 +223,7 @@ double IncrementalSolver::chi2(std::uint32_t observation) const {
   if (observation_there_.at(observation) == 0) {
     throw std::logic_error("IncrementalSolver::chi2: no such observation");
   }
-  const GraphObservation& seen = observations_[observation];
+  const Seen& seen = observations_[observation];
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   if (!reproject(observation, pose(seen.frame), point(seen.point), residual.data())) {
     return std::numeric_limits<double>::infinity();

@@ -52,7 +52,7 @@ double PoseTree::cost_of(std::span<const std::uint32_t> poses, std::vector<char>
       char& mark = marked[static_cast<std::size_t>(i)];
       if (mark != 0) break;
       mark = 1;
-      cost += factor_cost(at(i).factor.cols(), at(i).separator_rows());
+      cost += factor_cost(at(i).frontal_rows(), at(i).separator_rows());
     }
   }
   return cost;

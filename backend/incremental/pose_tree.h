@@ -25,6 +25,10 @@ class PoseTree {
     // parent is factored anew. Away from there one in so many levels keeps it, and what lies
     // between is factored again when it is asked for.
     int levels_kept = 32;
+    // From so many rows of a separator on, cliques that were left as they are keep their factor in
+    // single precision. It is solved for what differs from the separator's deltas by some 1e-7 of
+    // these, which no observation tells. Smaller ones are little memory anyway.
+    Eigen::Index narrow_from = 60;
     // How firmly a direction is held that no term determines: see refactor().
     double hold = 1e-9;
     // A variable that is no pose has changed once it moved by this share of its standard deviation
@@ -113,14 +117,17 @@ class PoseTree {
     std::vector<std::uint32_t> frontals;
     std::vector<std::uint32_t> separator;
     Eigen::MatrixXd factor;        // (f + s + 1) x f: [L11; L21; y^T], in rows of the tangents
+    Eigen::MatrixXf narrow;        // the same in single precision, where that is kept alone
     Eigen::MatrixXd contribution;  // (s + 1) x s: what it hands to its parent; or not kept
-    Eigen::VectorXd scale;         // s: Front::add_scale of what it hands on
+    Eigen::VectorXd packed;        // its lower triangle, column by column, where that is kept alone
+    Eigen::VectorXf scale;         // s: Front::add_scale of what it hands on
     std::int32_t parent = kNone;
     std::vector<std::int32_t> children;
     int height = 0;        // cliques below it, on the longest way down
     bool fresh = true;     // factored since it was last solved
     bool settled = false;  // those below it keep what they hand on in one level of some
 
+    Eigen::Index frontal_rows() const { return factor.cols() + narrow.cols(); }
     Eigen::Index separator_rows() const { return scale.size(); }
   };
 
@@ -170,14 +177,19 @@ class PoseTree {
   void restore_contribution(std::int32_t index, const TermSource& terms);
   void settle(std::int32_t index);
   void forget_contributions(const Clique& clique);
+  void narrow(Clique& clique) const;
+  static const Eigen::MatrixXd& factor_of(const Clique& clique, Eigen::MatrixXd& scratch);
+  static void pack(Clique& clique);
+  static void unpack(Clique& clique);
 
   // Its solution: tree_solution.cpp.
   void solve_clique(Clique& clique, double threshold, std::vector<std::uint32_t>& changed);
-  Eigen::VectorXd right_side(const Clique& clique) const;
-  Eigen::Index solve_shared(const Clique& clique, double threshold, Eigen::VectorXd& right);
-  void take(const Clique& clique, const Eigen::VectorXd& solved, double threshold,
-            std::vector<std::uint32_t>& changed);
-  bool has_changed(const Clique& clique, std::uint32_t variable, Eigen::Index row,
+  Eigen::VectorXd right_side(const Clique& clique, const Eigen::MatrixXd& factor) const;
+  Eigen::Index solve_shared(const Clique& clique, const Eigen::MatrixXd& factor, double threshold,
+                            Eigen::VectorXd& right);
+  void take(const Clique& clique, const Eigen::MatrixXd& factor, const Eigen::VectorXd& solved,
+            double threshold, std::vector<std::uint32_t>& changed);
+  bool has_changed(const Eigen::MatrixXd& factor, std::uint32_t variable, Eigen::Index row,
                    double threshold) const;
 
   // Covariances: tree_covariance.cpp.
@@ -206,6 +218,7 @@ class PoseTree {
   std::vector<std::uint32_t> slot_of_;    // scratch, by pose: slot in the front at hand
   std::vector<std::uint32_t> looked_at_;  // scratch, by term: the last look for which it was
   std::uint32_t look_ = 0;
+  Eigen::MatrixXd wide_;                  // scratch: a factor that is kept in single precision
   double last_cost_ = 0;
   std::size_t last_poses_ = 0;
   std::size_t last_undetermined_ = 0;

@@ -57,7 +57,7 @@ std::vector<std::int32_t> PoseTree::paths_to_roots(std::span<const std::uint32_t
     for (std::size_t k = path.size(); k-- > 0;) {
       const std::int32_t parent = at(path[k]).parent;
       depth[path[k]] = parent == kNone ? 0 : depth.at(parent) + 1;
-      numbers += static_cast<std::size_t>(at(path[k]).factor.size());
+      numbers += static_cast<std::size_t>(at(path[k]).factor.size() + at(path[k]).narrow.size());
     }
   }
   std::vector<std::int32_t> cliques;
@@ -81,28 +81,30 @@ Eigen::MatrixXd PoseTree::covariance(std::span<const std::uint32_t> variables) c
   KeptRows columns(*this, count);
   columns.scatter(wanted, units);
   const std::vector<std::int32_t> cliques = paths_to_roots(variables);
+  Eigen::MatrixXd wide;
   for (const std::int32_t i : cliques) {
     const Clique& clique = at(i);
-    const Eigen::Index f = clique.factor.cols();
+    const Eigen::MatrixXd& factor = factor_of(clique, wide);
+    const Eigen::Index f = factor.cols();
     const Eigen::Index s = clique.separator_rows();
     Eigen::MatrixXd solved = columns.gather(clique.frontals, f);
-    clique.factor.topRows(f).triangularView<Eigen::Lower>().solveInPlace(solved);
+    factor.topRows(f).triangularView<Eigen::Lower>().solveInPlace(solved);
     columns.scatter(clique.frontals, solved);
     if (s == 0) continue;
     Eigen::MatrixXd above = columns.gather(clique.separator, s);
-    above.noalias() -= clique.factor.middleRows(f, s) * solved;
+    above.noalias() -= factor.middleRows(f, s) * solved;
     columns.scatter(clique.separator, above);
   }
   for (std::size_t k = cliques.size(); k-- > 0;) {
     const Clique& clique = at(cliques[k]);
-    const Eigen::Index f = clique.factor.cols();
+    const Eigen::MatrixXd& factor = factor_of(clique, wide);
+    const Eigen::Index f = factor.cols();
     const Eigen::Index s = clique.separator_rows();
     Eigen::MatrixXd right = columns.gather(clique.frontals, f);
     if (s > 0) {
-      right.noalias() -=
-          clique.factor.middleRows(f, s).transpose() * columns.gather(clique.separator, s);
+      right.noalias() -= factor.middleRows(f, s).transpose() * columns.gather(clique.separator, s);
     }
-    clique.factor.topRows(f).triangularView<Eigen::Lower>().transpose().solveInPlace(right);
+    factor.topRows(f).triangularView<Eigen::Lower>().transpose().solveInPlace(right);
     columns.scatter(clique.frontals, right);
   }
   return columns.gather(wanted, count);
@@ -127,11 +129,12 @@ CholeskyPaths PoseTree::paths(std::span<const std::uint32_t> variables, std::siz
     }
     return found;
   };
+  Eigen::MatrixXd wide;
   for (const std::int32_t i : cliques) {
     const Clique& clique = at(i);
-    result.cliques.push_back(
-        {places(clique.frontals), places(clique.separator),
-         clique.factor.topRows(clique.factor.cols() + clique.separator_rows())});
+    const Eigen::MatrixXd& factor = factor_of(clique, wide);
+    result.cliques.push_back({places(clique.frontals), places(clique.separator),
+                              factor.topRows(factor.cols() + clique.separator_rows())});
   }
   return result;
 }

@@ -33,18 +33,22 @@ double PoseTree::factor_cost(Eigen::Index frontals, Eigen::Index separator) {
 
 // The clique's terms and all below are what they were when it was factored.
 void PoseTree::restore_contribution(std::int32_t index, const TermSource& terms) {
+  if (at(index).packed.size() > 0) unpack(at(index));
   if (at(index).contribution.cols() == at(index).separator_rows()) return;
   for (const std::int32_t child : at(index).children) restore_contribution(child, terms);
   const bool fresh = at(index).fresh;
   factor(index, own_terms(at(index), terms), terms);
   at(index).fresh = fresh;
-  if (at(index).settled) forget_contributions(at(index));
+  if (!at(index).settled) return;
+  narrow(at(index));
+  forget_contributions(at(index));
 }
 
 // What is below a clique that was left as it is will not be factored soon.
 void PoseTree::settle(std::int32_t index) {
   if (at(index).settled) return;
   at(index).settled = true;
+  narrow(at(index));
   forget_contributions(at(index));
   for (const std::int32_t child : at(index).children) settle(child);
 }
@@ -52,8 +56,47 @@ void PoseTree::settle(std::int32_t index) {
 // Of its children.
 void PoseTree::forget_contributions(const Clique& clique) {
   for (const std::int32_t child : clique.children) {
-    if ((at(child).height + 1) % options_.levels_kept != 0) at(child).contribution.resize(0, 0);
+    if ((at(child).height + 1) % options_.levels_kept == 0) pack(at(child));
+    at(child).contribution.resize(0, 0);
   }
+}
+
+void PoseTree::narrow(Clique& clique) const {
+  if (clique.separator_rows() < options_.narrow_from) return;
+  clique.narrow = clique.factor.cast<float>();
+  clique.factor.resize(0, 0);
+}
+
+// A clique's factor in double precision, in `scratch` where it is not kept so.
+const Eigen::MatrixXd& PoseTree::factor_of(const Clique& clique, Eigen::MatrixXd& scratch) {
+  if (clique.narrow.size() == 0) return clique.factor;
+  scratch.resize(clique.narrow.rows(), clique.narrow.cols());
+  std::copy_n(clique.narrow.data(), clique.narrow.size(), scratch.data());
+  return scratch;
+}
+
+// The lower triangle is all that there is to know, and half of the memory.
+void PoseTree::pack(Clique& clique) {
+  const Eigen::MatrixXd& full = clique.contribution;
+  if (full.size() == 0) return;
+  const Eigen::Index rows = full.rows();
+  clique.packed.resize(full.cols() * (rows + 2) / 2);
+  Eigen::Index at = 0;
+  for (Eigen::Index column = 0; column < full.cols(); ++column) {
+    clique.packed.segment(at, rows - column) = full.col(column).tail(rows - column);
+    at += rows - column;
+  }
+}
+
+void PoseTree::unpack(Clique& clique) {
+  const Eigen::Index rows = clique.separator_rows() + 1;
+  clique.contribution.setZero(rows, rows - 1);
+  Eigen::Index at = 0;
+  for (Eigen::Index column = 0; column + 1 < rows; ++column) {
+    clique.contribution.col(column).tail(rows - column) = clique.packed.segment(at, rows - column);
+    at += rows - column;
+  }
+  clique.packed.resize(0);
 }
 
 void PoseTree::add_contribution(const Clique& child, Front& front) const {
@@ -75,7 +118,7 @@ void PoseTree::add_contribution(const Clique& child, Front& front) const {
       row += height;
     }
     front.add_gradient(slot_j, child.contribution.row(rows).segment(column, width).transpose());
-    front.add_scale(slot_j, child.scale.segment(column, width));
+    front.add_scale(slot_j, child.scale.segment(column, width).cast<double>());
     column += width;
   }
 }
@@ -171,7 +214,7 @@ void PoseTree::factor(std::int32_t index, const std::vector<std::uint32_t>& own,
   }
   eliminate_frontals(clique, front);
   clique.fresh = true;
-  last_cost_ += factor_cost(clique.factor.cols(), clique.separator_rows());
+  last_cost_ += factor_cost(clique.frontal_rows(), clique.separator_rows());
 }
 
 // Leaves the columns of the factor, and what they leave on the separator.
@@ -180,8 +223,9 @@ void PoseTree::eliminate_frontals(Clique& clique, Front& front) {
   const Eigen::Index s = rows_of(clique.separator);
   Eigen::MatrixXd& matrix = front.matrix();
   clique.factor = matrix.leftCols(f);
+  clique.narrow.resize(0, 0);
   clique.contribution = matrix.bottomRightCorner(s + 1, s);
-  clique.scale = front.scale().tail(s);
+  clique.scale = front.scale().tail(s).cast<float>();
   factor_frontals(clique, front);
   if (!clique.factor.topRows(f).diagonal().allFinite() || !clique.factor.row(f + s).allFinite()) {
     throw std::logic_error("PoseTree: a term is not finite");

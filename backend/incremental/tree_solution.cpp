@@ -6,24 +6,25 @@
 
 namespace hybrid_slam {
 
-// Whether a variable, solved in this clique from this row on, moved by more than is worth telling.
-bool PoseTree::has_changed(const Clique& clique, std::uint32_t variable, Eigen::Index row,
+// Whether a variable, solved by a clique's factor from this row on, moved by more than is worth
+// telling.
+bool PoseTree::has_changed(const Eigen::MatrixXd& factor, std::uint32_t variable, Eigen::Index row,
                            double threshold) const {
   const Eigen::Map<const Eigen::VectorXd> sent(sent_.data() + offset_[variable], size(variable));
   if (is_pose_[variable] != 0) {
     return (delta_of(variable) - sent).lpNorm<Eigen::Infinity>() > threshold;
   }
   const Eigen::VectorXd way = delta_of(variable) - sent;
-  const auto root = clique.factor.block(row, row, way.size(), way.size());
+  const auto root = factor.block(row, row, way.size(), way.size());
   const Eigen::VectorXd in_sigmas = root.triangularView<Eigen::Lower>().transpose() * way;
   return in_sigmas.norm() > options_.share;
 }
 
 // What the frontals' triangle is solved for, with the deltas of the separator as they are.
-Eigen::VectorXd PoseTree::right_side(const Clique& clique) const {
-  const Eigen::Index f = clique.factor.cols();
+Eigen::VectorXd PoseTree::right_side(const Clique& clique, const Eigen::MatrixXd& factor) const {
+  const Eigen::Index f = factor.cols();
   const Eigen::Index s = clique.separator_rows();
-  Eigen::VectorXd right = -clique.factor.row(f + s).transpose();
+  Eigen::VectorXd right = -factor.row(f + s).transpose();
   if (s > 0) {
     Eigen::VectorXd separator(s);
     Eigen::Index row = 0;
@@ -31,7 +32,7 @@ Eigen::VectorXd PoseTree::right_side(const Clique& clique) const {
       separator.segment(row, size(pose)) = delta_of(pose);
       row += size(pose);
     }
-    right.noalias() -= clique.factor.middleRows(f, s).transpose() * separator;
+    right.noalias() -= factor.middleRows(f, s).transpose() * separator;
   }
   return right;
 }
@@ -40,30 +41,30 @@ Eigen::VectorXd PoseTree::right_side(const Clique& clique) const {
 // begin. What is shared stays where it is until that is worth telling all others, and they are
 // solved for with it there: those in this clique, too, or the motion would reach everything by
 // them.
-Eigen::Index PoseTree::solve_shared(const Clique& clique, double threshold,
-                                    Eigen::VectorXd& right) {
-  Eigen::Index rest = clique.factor.cols();
+Eigen::Index PoseTree::solve_shared(const Clique& clique, const Eigen::MatrixXd& factor,
+                                    double threshold, Eigen::VectorXd& right) {
+  Eigen::Index rest = factor.cols();
   for (std::size_t i = clique.frontals.size(); i-- > 0 && is_shared(clique.frontals[i]);) {
     const std::uint32_t variable = clique.frontals[i];
     const Eigen::Index first = rest - size(variable);
     auto value = right.segment(first, rest - first);
-    clique.factor.block(first, first, rest - first, rest - first)
+    factor.block(first, first, rest - first, rest - first)
         .triangularView<Eigen::Lower>()
         .transpose()
         .solveInPlace(value);
     const Eigen::VectorXd before = delta_of(variable);
     values(delta_, variable) = value;
-    if (!has_changed(clique, variable, first, threshold)) value = before;
+    if (!has_changed(factor, variable, first, threshold)) value = before;
     values(delta_, variable) = before;
-    right.head(first).noalias() -=
-        clique.factor.block(first, 0, rest - first, first).transpose() * value;
+    right.head(first).noalias() -= factor.block(first, 0, rest - first, first).transpose() * value;
     rest = first;
   }
   return rest;
 }
 
 // Makes what was solved for the deltas of the frontals.
-void PoseTree::take(const Clique& clique, const Eigen::VectorXd& solved, double threshold,
+void PoseTree::take(const Clique& clique, const Eigen::MatrixXd& factor,
+                    const Eigen::VectorXd& solved, double threshold,
                     std::vector<std::uint32_t>& changed) {
   const bool finite = solved.allFinite();
   Eigen::Index row = 0;
@@ -74,7 +75,7 @@ void PoseTree::take(const Clique& clique, const Eigen::VectorXd& solved, double 
     before_.insert(before_.end(), delta.begin(), delta.end());
     before_.insert(before_.end(), sent.begin(), sent.end());
     if (finite) delta = solved.segment(row, size(pose));
-    if (has_changed(clique, pose, row, threshold)) {
+    if (has_changed(factor, pose, row, threshold)) {
       sent = delta;
       moved_[pose] = 1;
       changed.push_back(pose);
@@ -84,14 +85,12 @@ void PoseTree::take(const Clique& clique, const Eigen::VectorXd& solved, double 
 }
 
 void PoseTree::solve_clique(Clique& clique, double threshold, std::vector<std::uint32_t>& changed) {
-  Eigen::VectorXd right = right_side(clique);
-  const Eigen::Index rest = solve_shared(clique, threshold, right);
+  const Eigen::MatrixXd& factor = factor_of(clique, wide_);
+  Eigen::VectorXd right = right_side(clique, factor);
+  const Eigen::Index rest = solve_shared(clique, factor, threshold, right);
   auto others = right.head(rest);
-  clique.factor.topLeftCorner(rest, rest)
-      .triangularView<Eigen::Lower>()
-      .transpose()
-      .solveInPlace(others);
-  take(clique, right, threshold, changed);
+  factor.topLeftCorner(rest, rest).triangularView<Eigen::Lower>().transpose().solveInPlace(others);
+  take(clique, factor, right, threshold, changed);
   clique.fresh = false;
 }
 

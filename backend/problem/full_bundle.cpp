@@ -1,5 +1,6 @@
 #include "backend/problem/full_bundle.h"
 
+#include <algorithm>
 #include <vector>
 
 #include "backend/problem/odometry_constraints.h"
@@ -9,6 +10,9 @@ namespace hybrid_slam {
 ProblemConfig make_full_bundle(const MapSnapshot& map, const FullBundleOptions& options) {
   ProblemConfig config;
   config.options = options.problem;
+  if (map.keyframe_count() > options.max_keyframes) {
+    config.window = std::max<std::size_t>(2, options.max_keyframes);
+  }
   if (!map.origin().valid()) return config;
   config.fixed_poses = {map.origin()};
   config.variable_poses = map.keyframe_ids();

@@ -9,15 +9,12 @@ namespace hybrid_slam {
 
 struct FullBundleOptions {
   ProblemOptions problem{.rounds = {{10, Loss::kHuber, 1e-4}, {20, Loss::kNone, 1e-8}}};
-  bool enabled = true;               // after a loop was closed
-  std::size_t max_keyframes = 1000;  // of a map that it is done for; larger ones have the smoother
-  bool refine_intrinsics = false;    // of all cameras; a stereo pair keeps its baseline
+  bool enabled = true;  // after a loop was closed
+  // That vary at once. A larger map is adjusted in windows of so many (solve_windows.h).
+  std::size_t max_keyframes = 1000;
+  bool refine_intrinsics =
+      false;  // of all cameras; a stereo pair keeps its baseline; not in windows
 };
-
-// Whether everything is to be adjusted after a loop.
-inline bool wants_full_bundle(const MapSnapshot& map, const FullBundleOptions& options) {
-  return options.enabled && map.keyframe_count() <= options.max_keyframes;
-}
 
 // Bundle adjustment of every keyframe but the origin and of every landmark, with the odometry.
 ProblemConfig make_full_bundle(const MapSnapshot& map, const FullBundleOptions& options);

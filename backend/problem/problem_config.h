@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -64,6 +65,7 @@ struct ProblemConfig {
   std::vector<CameraId> refined_cameras;  // whose intrinsics vary, the baseline excepted
   std::vector<PoseConstraint> constraints;
   bool with_scale = false;  // poses as similarities: constraints only, no observations
+  std::size_t window = 0;   // poses that vary at once (solve_windows.h); 0: all
   ProblemOptions options;
 };
 

@@ -3,6 +3,7 @@
 #include "backend/problem/loop_correction.h"
 #include "backend/problem/map_graph.h"
 #include "backend/problem/solve_graph.h"
+#include "backend/problem/solve_windows.h"
 
 namespace hybrid_slam {
 
@@ -50,7 +51,9 @@ void write_estimate(const MapGraph& made, BundleResult& result) {
 BundleResult solve_bundle(const MapSnapshot& map, const ProblemConfig& config,
                           const std::stop_token& stop) {
   MapGraph made = make_graph(map, config);
-  const GraphSummary solved = solve_graph(made.graph, config.options, stop);
+  const GraphSummary solved = config.window > 0
+                                  ? solve_windows(made.graph, config.window, config.options, stop)
+                                  : solve_graph(made.graph, config.options, stop);
   BundleResult result;
   result.summary = summary_of(solved, made.observations.size());
   if (solved.end == SolveEnd::kFailed || solved.end == SolveEnd::kEmpty) {

@@ -157,17 +157,22 @@ TEST_CASE("backend: an adjustment of everything is carried over a loop that was 
   CHECK(circle.worst_error() < 0.02);
 }
 
-TEST_CASE("backend: everything is adjusted where the options want it") {
-  Backend backend(chain_backend());
-  OpenCircle circle(backend);
-  const std::size_t count = backend.view().keyframe_count();
-  FullBundleOptions options;
-  options.max_keyframes = count;
-  CHECK(wants_full_bundle(backend.view(), options));
-  options.max_keyframes = count - 1;
-  CHECK_FALSE(wants_full_bundle(backend.view(), options));
-  options = {.enabled = false};
-  CHECK_FALSE(wants_full_bundle(backend.view(), options));
+TEST_CASE("backend: a map that is too large for one adjustment has it in windows") {
+  BackendOptions options = chain_backend();
+  Backend whole(options);
+  OpenCircle circle(whole);
+  REQUIRE(whole.close(circle.loop()).end == LoopEnd::kClosed);
+  options.full.max_keyframes = whole.view().keyframe_count() / 3;
+  Backend parts(options);
+  OpenCircle same(parts);
+  REQUIRE(parts.close(same.loop()).end == LoopEnd::kClosed);
+  CHECK(make_full_bundle(whole.view(), chain_backend().full).window == 0);
+  CHECK(make_full_bundle(parts.view(), options.full).window == options.full.max_keyframes);
+  const BundleSummary at_once = whole.optimize_full();
+  const BundleSummary in_windows = parts.optimize_full();
+  CHECK(in_windows.variable_poses == at_once.variable_poses);
+  CHECK(in_windows.variable_landmarks == at_once.variable_landmarks);
+  CHECK(in_windows.end == SolveEnd::kConverged);
 }
 
 TEST_CASE("backend: a loop that is not believed changes nothing") {

@@ -177,6 +177,7 @@ class Lap {
 double above_batch(const MapSnapshot& map) {
   FullBundleOptions options;
   options.problem.rounds = {{30, Loss::kHuber, 1e-9}};
+  options.max_keyframes = map.keyframe_count();
   const BundleSummary summary = solve_full(map, options).summary;
   return summary.initial_cost / summary.final_cost - 1;
 }

@@ -25,12 +25,20 @@ Rigid3d keyframe_pose(int index) {
 
 }  // namespace
 
+std::vector<Rigid3d> corridor_poses(int keyframes) {
+  std::vector<Rigid3d> poses;
+  for (int i = 0; i < keyframes; ++i) poses.push_back(keyframe_pose(i));
+  return poses;
+}
+
 FactorGraph corridor_graph(int keyframes, int landmarks_per_step) {
   Random random(1);
   const Camera camera = synthetic_stereo_camera(0.5);
   FactorGraph graph;
   graph.cameras.push_back({camera, 0});
-  for (int i = 0; i < keyframes; ++i) graph.frames.push_back({keyframe_pose(i), 0, i == 0});
+  for (const Rigid3d& pose : corridor_poses(keyframes)) {
+    graph.frames.push_back({pose, 0, graph.frames.empty()});
+  }
   for (int step = 0; step < keyframes; ++step) {
     for (int k = 0; k < landmarks_per_step; ++k) {
       // On the walls, ahead of the keyframe of this number.

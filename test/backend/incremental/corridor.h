@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "backend/problem/factor_graph.h"
 
 namespace hybrid_slam {
@@ -7,5 +9,8 @@ namespace hybrid_slam {
 // A straight run of stereo keyframes without any loop: as many landmarks in sight and as many
 // keyframes that share them everywhere. From disturbed starts.
 FactorGraph corridor_graph(int keyframes, int landmarks_per_step);
+
+// Where its keyframes truly are, cam_from_world.
+std::vector<Rigid3d> corridor_poses(int keyframes);
 
 }  // namespace hybrid_slam

@@ -1,6 +1,8 @@
 #include "backend/incremental/landmark_term.h"
 
+#include "backend/incremental/condensed_term.h"
 #include "backend/incremental/front.h"
+#include "backend/incremental/world_tangent.h"
 #include "test/support/random.h"
 
 #include <catch2/catch.hpp>
@@ -167,6 +169,56 @@ TEST_CASE("landmark term: a point at unknown depth contributes nothing") {
 
   term.views.push_back(random_view(2, 2, random));  // from aside
   check_against_dense(term, 3, random);
+}
+
+// Sees a point from a pose whose tangent has this place: moving all together changes nothing.
+LandmarkView view_of(const Eigen::Vector3d& point, std::uint32_t pose, const Eigen::Vector3d& place,
+                     Random& random) {
+  LandmarkView view = random_view(pose, 3, random);
+  view.by_pose.leftCols<3>() = view.by_point;
+  view.by_pose.rightCols<3>() = -view.by_point * hat(point - place);
+  return view;
+}
+
+TEST_CASE("condensed term: in single precision it says nothing about a common motion") {
+  Random random(8);
+  std::vector<Eigen::Vector3d> places;
+  for (int i = 0; i < 6; ++i) places.emplace_back(i, random.uniform(-1, 1), 30 + random.uniform());
+  std::vector<LandmarkTerm> landmarks(40);
+  std::vector<const LandmarkTerm*> all;
+  std::vector<double> costs(landmarks.size(), 0);
+  for (LandmarkTerm& landmark : landmarks) {
+    const Eigen::Vector3d point = random.vector(3, 5);
+    const int first = random.integer(0, 2);
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      const std::uint32_t pose = static_cast<std::uint32_t>(first) + i;
+      landmark.views.push_back(view_of(point, pose, places[pose], random));
+    }
+    landmark.eliminate();
+    all.push_back(&landmark);
+  }
+  CondensedTerm term;
+  term.begin({0, 1, 2, 3, 4, 5}, Eigen::VectorXd::Zero(36));
+  term.add(all, costs, places);
+  const auto common_motion = [&] {
+    const Vector6d xi = random.vector(6, 1);
+    Eigen::VectorXd common(36);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      common.segment<6>(static_cast<Eigen::Index>(6 * i)) = WorldTangent{places[i]}.increment(xi);
+    }
+    return common;
+  };
+  const Eigen::VectorXd common = common_motion();
+  double size = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto own = common.segment<6>(static_cast<Eigen::Index>(6 * i));
+    size += own.dot(term.own[i] * own);
+  }
+  CHECK(std::abs(common.dot(term.times(common))) < 1e-12 * size);
+  CHECK(std::abs(common_motion().dot(term.times(common))) < 1e-12 * size);
+  Eigen::VectorXd bent = common;
+  bent.head<6>() += random.vector(6, 1);
+  CHECK(bent.dot(term.times(bent)) > 1e-4 * size);
 }
 
 }  // namespace

@@ -85,7 +85,8 @@ std::vector<std::uint32_t> edit(LinearTerms& terms, Random& random) {
 // A chain in time, with a term over each two neighbours; every pose but the first comes with its
 // own update.
 struct Chain {
-  explicit Chain(std::uint32_t count) : terms(count), tree(PoseTree::Options{}) {
+  explicit Chain(std::uint32_t count, const PoseTree::Options& options = {})
+      : terms(count), tree(options) {
     tree.resize(count);
     terms.add_random({0}, random);
     for (std::uint32_t i = 1; i < count; ++i) {
@@ -103,12 +104,12 @@ struct Chain {
   std::size_t largest_update = 0;
 };
 
-TEST_CASE("pose tree: any sequence of edits solves what a dense solver solves") {
+void check_edits(const PoseTree::Options& options, double accuracy) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
     const auto count = static_cast<std::size_t>(random.integer(1, 40));
     LinearTerms terms(count);
-    PoseTree tree(PoseTree::Options{});
+    PoseTree tree(options);
     tree.resize(count);
     std::vector<std::uint32_t> changed;
     for (int round = 0; round < 60; ++round) {
@@ -121,10 +122,41 @@ TEST_CASE("pose tree: any sequence of edits solves what a dense solver solves") 
       if (random.uniform() < 0.5) newest.push_back(static_cast<std::uint32_t>(count) - 1);
       tree.refactor(touched, newest, terms);
       tree.solve(0, changed);
-      REQUIRE(mismatch(tree, terms) < 1e-8);
+      REQUIRE(mismatch(tree, terms) < accuracy);
     }
     CHECK(tree.singular_cliques() == 0);
   }
+}
+
+TEST_CASE("pose tree: any sequence of edits solves what a dense solver solves") {
+  PoseTree::Options options;
+  options.narrow_from = 1000;  // more than there are
+  SECTION("all factors in double precision") { check_edits(options, 1e-8); }
+  SECTION("what cliques hand on, kept at some levels") {
+    options.levels_kept = GENERATE(1, 2, 3);
+    check_edits(options, 1e-8);
+  }
+  SECTION("factors in single precision") {
+    options.narrow_from = 0;
+    options.levels_kept = GENERATE(1, 3);
+    check_edits(options, 1e-4);
+  }
+}
+
+TEST_CASE("pose tree: single precision is of what is left alone, and covariances agree") {
+  PoseTree::Options single;
+  single.narrow_from = 0;
+  Chain narrow(60, single);
+  Chain wide(60);
+  double worst = 0;
+  for (const std::uint32_t pose : {0U, 20U, 59U}) {
+    worst = std::max(worst, (narrow.tree.covariance(pose) - wide.tree.covariance(pose)).norm() /
+                                wide.tree.covariance(pose).norm());
+  }
+  CHECK(worst < 1e-5);
+  CHECK(worst > 1e-12);
+  CHECK(mismatch(narrow.tree, narrow.terms) < 1e-5);
+  CHECK(mismatch(wide.tree, wide.terms) < 1e-8);
 }
 
 TEST_CASE("pose tree: a pose that lost its terms keeps its delta, and may come back") {

@@ -8,6 +8,7 @@
 #include "factors/pose_prior.h"
 #include "test/backend/mixed_graphs/test_factors.h"
 #include "test/support/random.h"
+#include "test/support/synthetic_scene.h"
 
 namespace hybrid_slam {
 
@@ -60,6 +61,35 @@ void disturb_blocks(std::vector<Eigen::VectorXd>& blocks, Random& random) {
     block.head<3>() += random.gaussian3(weighed.sigma_place / kSampleTime);
     block.tail<6>() += walk;
     for (double& value : walk) value += weighed.sigma_bias * random.gaussian();
+  }
+}
+
+// Ahead of each pose, on either side; all that see one observe it.
+void add_landmarks(const InertialChainOptions& options, InertialChain& chain) {
+  constexpr double kNearest = 1;  // [m]
+  constexpr double kFarthest = 5;
+  constexpr double kSigma = 0.5;  // [px]
+  Random random(options.seed + 2000);
+  FactorGraph& graph = chain.graph;
+  const Calibrated<RectifiedStereo> camera = synthetic_stereo_camera(0.2);
+  graph.cameras.push_back({camera, 0});
+  for (GraphFrame& frame : graph.frames) frame.camera = 0;
+  for (std::uint32_t i = 0; i < graph.frames.size(); ++i) {
+    for (int k = 0; k < options.landmarks; ++k) {
+      const Eigen::Vector3d in_cam(random.uniform(-1, 1), random.uniform(-1, 1),
+                                   random.uniform(2, kFarthest));
+      const Eigen::Vector3d at = inverse(chain.truth[i]) * in_cam;
+      const auto point = static_cast<std::uint32_t>(graph.points.size());
+      graph.points.push_back({at + random.gaussian3(0.05), false});
+      for (std::uint32_t j = 0; j < graph.frames.size(); ++j) {
+        const Eigen::Vector3d seen_at = chain.truth[j] * at;
+        if (seen_at.z() < kNearest || seen_at.z() > kFarthest) continue;
+        const auto seen = project_stereo(camera, seen_at);
+        if (!seen || !in_image(camera, seen->head<2>())) continue;
+        graph.observations.push_back(
+            {j, point, *seen + random.gaussian3(options.noise * kSigma), kSigma});
+      }
+    }
   }
 }
 
@@ -125,6 +155,7 @@ InertialChain inertial_chain(const InertialChainOptions& options) {
          {pose_variable(0)}});
     graph.factors.push_back({value_factor<9>(block, kBlockSigma), {block_variable(0)}});
   }
+  if (options.landmarks > 0) add_landmarks(options, chain);
   for (int k = 0; k < options.ranges; ++k) {
     const Eigen::Vector3d place = 3 * random.direction();
     GraphBlock beacon;
@@ -147,6 +178,7 @@ MixedFeed::MixedFeed(FactorGraph graph, const IncrementalOptions& options)
     : graph_(std::move(graph)),
       edges_of_(graph_.frames.size()),
       factors_of_(graph_.frames.size()),
+      observations_of_(graph_.frames.size()),
       blocks_of_(graph_.frames.size()),
       block_in_solver_(graph_.blocks.size(), GraphBlock::kNone),
       point_in_solver_(graph_.points.size(), GraphBlock::kNone),
@@ -163,6 +195,9 @@ MixedFeed::MixedFeed(FactorGraph graph, const IncrementalOptions& options)
   }
   for (std::uint32_t i = 0; i < graph_.edges.size(); ++i) {
     edges_of_[std::max(graph_.edges[i].a, graph_.edges[i].b)].push_back(i);
+  }
+  for (std::uint32_t i = 0; i < graph_.observations.size(); ++i) {
+    observations_of_[graph_.observations[i].frame].push_back(i);
   }
   for (std::uint32_t i = 0; i < graph_.factors.size(); ++i) {
     std::uint32_t last = 0;
@@ -199,17 +234,26 @@ void MixedFeed::add_next() {
         variable.index = block_in_solver_[variable.index];
       }
       if (variable.kind != GraphVariable::Kind::kPoint) continue;
-      std::uint32_t& point = point_in_solver_[variable.index];
-      if (point == GraphBlock::kNone) {
-        point = solver_.add_point(
-            inverse(solver_.pose(next_)) *
-            (graph_.frames[next_].cam_from_world * graph_.points[variable.index].in_world));
-      }
-      variable.index = point;
+      variable.index = known_point(variable.index);
     }
     solver_.add_factor(factor);
   }
+  for (const std::uint32_t i : observations_of_[next_]) {
+    GraphObservation seen = graph_.observations[i];
+    seen.point = known_point(seen.point);
+    solver_.add_observation(seen);
+  }
   ++next_;
+}
+
+// In the solver; a new one lies before the next frame as it does in the graph.
+std::uint32_t MixedFeed::known_point(std::uint32_t index) {
+  std::uint32_t& point = point_in_solver_[index];
+  if (point == GraphBlock::kNone) {
+    point = solver_.add_point(inverse(solver_.pose(next_)) * (graph_.frames[next_].cam_from_world *
+                                                              graph_.points[index].in_world));
+  }
+  return point;
 }
 
 UpdateSummary MixedFeed::feed_next() {

@@ -21,6 +21,7 @@ struct InertialChainOptions {
   int poses = 60;
   double laps = 1.2;          // of a circle of 5 m radius
   int ranges = 0;             // beacons, as blocks of three behind those of the frames
+  int landmarks = 0;          // per pose, ahead of it, which a stereo pair sees on every lap
   bool world_vectors = true;  // whether velocities turn with their poses
   bool odometry = true;
   bool loops = true;   // edges to a lap before
@@ -39,14 +40,18 @@ class MixedFeed {
  public:
   MixedFeed(FactorGraph graph, const IncrementalOptions& options);
   bool done() const { return next_ == graph_.frames.size(); }
+  std::uint32_t count() const { return next_; }
   void add_next();
   UpdateSummary feed_next();
   IncrementalSolver& solver() { return solver_; }
 
  private:
+  std::uint32_t known_point(std::uint32_t point);
+
   FactorGraph graph_;
   std::vector<std::vector<std::uint32_t>> edges_of_;
   std::vector<std::vector<std::uint32_t>> factors_of_;
+  std::vector<std::vector<std::uint32_t>> observations_of_;
   std::vector<std::vector<std::uint32_t>> blocks_of_;  // by the frame that they ride with
   std::vector<std::uint32_t> block_in_solver_;
   std::vector<std::uint32_t> point_in_solver_;
