@@ -16,8 +16,11 @@ struct CalibrationFigures {
   std::vector<ResidualMap> maps;  // by camera, of all its keyframes
   std::vector<SystematicPart> systematic;
   RigFindings rig;
+  std::optional<LensError> lens;     // of the stereo pair
   bool stereo = false;               // `rig` says something
   std::vector<std::string> reasons;  // why the rig should be calibrated again; empty: it need not
+  // In what the rig is another one than that of the map which the run went on with.
+  std::vector<std::string> changes;
 };
 
 // `rig` may be null.
