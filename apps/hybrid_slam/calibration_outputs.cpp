@@ -70,6 +70,21 @@ void judge_disparities(const RigFindings& rig, std::vector<std::string>& reasons
                                 rig.disparity_offset, 100 * scale));
 }
 
+void judge_lens(const MapSnapshot& map, CalibrationFigures& figures) {
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    if (!(baseline(map.camera(CameraId(i))) > 0)) continue;
+    figures.lens = find_lens_error(map, CameraId(i), FloorFinder::kMost);
+  }
+  if (!figures.lens || !figures.lens->is_shown()) return;
+  const LensError& lens = *figures.lens;
+  figures.reasons.push_back(
+      fmt::format("lenses distort by {:+.2f} +- {:.2f} % more at the corner than calibrated, which "
+                  "makes the way "
+                  "{:.1f} % too {}",
+                  100 * lens.corner, 100 * std::abs(lens.corner * lens.sigma / lens.distortion),
+                  100 * std::abs(lens.scale - 1), lens.scale > 1 ? "long" : "short"));
+}
+
 void judge_residuals(const MapSnapshot& map, CalibrationFigures& figures) {
   for (std::size_t i = 0; i < figures.maps.size(); ++i) {
     const SystematicPart& part = figures.systematic[i];
@@ -110,6 +125,7 @@ CalibrationFigures calibration_figures(const MapSnapshot& map, const RigFindings
     judge_disparities(*rig, figures.reasons);
   }
   judge_residuals(map, figures);
+  judge_lens(map, figures);
   return figures;
 }
 
@@ -138,6 +154,14 @@ Json to_json(const CalibrationFigures& figures) {
     json["of_map"] = {{"rows_px", rig.of_map.rows ? Json(rig.of_map.rows->row_rms) : Json()},
                       {"disparity", to_json(rig.of_map.disparity)},
                       {"shading", to_json(rig.of_map.shading)}};
+  }
+  if (const auto& lens = figures.lens) {
+    json["lens"] = {{"distortion", lens->distortion},
+                    {"sigma", lens->sigma},
+                    {"corner", lens->corner},
+                    {"scale", lens->scale}};
+  } else {
+    json["lens"] = Json();
   }
   Json& systematic = json["systematic_px"] = Json::array();
   for (const SystematicPart& part : figures.systematic) {

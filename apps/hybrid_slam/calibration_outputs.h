@@ -1,12 +1,14 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "backend/map/map_snapshot.h"
+#include "frontend/calibration/lens_error.h"
 #include "frontend/calibration/rig_calibrator.h"
 
 namespace hybrid_slam {
