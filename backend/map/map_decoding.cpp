@@ -360,7 +360,7 @@ class MapDecoder {
   std::uint32_t version_;                                     // of the file
   std::uint32_t keyframes_ = 0, erased_ = 0, landmarks_ = 0;  // how many there shall be
   std::uint32_t corrections_ = 0;
-  std::uint32_t odometry_ = 0;                                // likewise, that are still to come
+  std::uint32_t odometry_ = 0;  // likewise, that are still to come
   std::uint32_t next_keyframe_ = 0, next_erased_ = 0, next_landmark_ = 0;  // least id to come
   std::uint32_t next_odometry_ = 0;
 };

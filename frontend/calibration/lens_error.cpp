@@ -13,11 +13,14 @@
 namespace hybrid_slam {
 namespace {
 
-constexpr double kMedianOfChi2 = 2.366;   // of 3 degrees of freedom
+constexpr double kMedianOfChi2 = 2.366;  // of 3 degrees of freedom
 // Once in a million, likewise. What the optimisers' 95 % leave in the map is all to be counted: it
 // is at the corners that distortion shows, and the largest residuals with it.
 constexpr double kOutlierOfChi2 = 30.66;
 constexpr double kAccidentalLens = 4.89;  // once in a million: standard deviations, two-sided
+// Of a distortion, and of what it does to the scale, that is found at least: what contradicts it
+// most, at the corners, the map has lost as outliers.
+constexpr double kShareFound = 0.75;
 
 using Stereo = Calibrated<RectifiedStereo>;
 using RowMatrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -235,7 +238,8 @@ double ratio_of_ways(const MapSnapshot& map, const std::vector<KeyframeId>& ids,
 }  // namespace
 
 bool LensError::is_shown() const {
-  return std::abs(distortion) > kAccidentalLens * sigma && std::abs(scale - 1) > kDoubtfulScale;
+  return std::abs(distortion) > kAccidentalLens * sigma &&
+         std::abs(scale - 1) > kShareFound * kDoubtfulScale;
 }
 
 std::optional<LensError> find_lens_error(const MapSnapshot& map, CameraId id, std::size_t most) {

@@ -68,10 +68,13 @@ TEST_CASE("a distortion that was left in is found, and what it does to the scale
       REQUIRE(one.found);
       CAPTURE(k, seed, one.way / one.true_way, one.found->scale, one.found->distortion,
               one.found->sigma);
+      CHECK(one.found->is_shown());
       CHECK(one.found->sigma < 1e-3);
-      CHECK(std::abs(one.found->distortion - k) < 4 * one.found->sigma);
-      // By half of a per mille of noise, and what is not linear.
-      CHECK(one.found->scale == Approx(one.way / one.true_way).margin(0.001));
+      // Not all of it: what contradicts most, the adjustment has taken for outliers.
+      const double share = one.found->distortion / k;
+      const double share_of_scale = (one.found->scale - 1) / (one.way / one.true_way - 1);
+      CHECK((share > 0.75 && share < 1 + 4 * one.found->sigma / std::abs(k)));
+      CHECK((share_of_scale > 0.75 && share_of_scale < 1 + 4 * one.found->sigma / std::abs(k)));
     }
   }
 }
