@@ -104,14 +104,18 @@ void Backend::drop_features(const std::vector<KeyframeId>& keyframes) {
   }
 }
 
-void Backend::shift_disparities(CameraId camera, double by) {
+void Backend::set_correction(CameraId camera, const RigCorrection& correction) {
+  map_.set_correction(camera, correction);
+}
+
+void Backend::shift_disparities(CameraId camera, double by, KeyframeId first) {
   BundleResult as_it_was;
   for (const KeyframeId id : view().keyframe_ids()) {
     as_it_was.cam_from_world.emplace_back(id, view().at(id).cam_from_world);
   }
   move(as_it_was);  // a state of its own, so that results of the one before are recognised
   forget_moves(moves_.size());
-  const double scale = hybrid_slam::shift_disparities(map_, camera, by);
+  const double scale = hybrid_slam::shift_disparities(map_, camera, by, first);
   const auto resized = [&](const Sim3d& a_from_b) {
     return Sim3d(a_from_b.rotation(), scale * a_from_b.translation(), a_from_b.scale());
   };

@@ -64,9 +64,13 @@ class Backend {
   // their keypoints still holds: results of earlier snapshots are taken in all the same.
   void drop_features(const std::vector<KeyframeId>& keyframes);
 
-  // All disparities of a stereo camera become larger by so much [px]: see shift_disparities(). The
-  // next optimisation adjusts everything; a full one of an earlier snapshot is no longer taken in.
-  void shift_disparities(CameraId camera, double by);
+  // All disparities of a stereo camera become larger by so much [px], from the keyframe `first` on:
+  // see shift_disparities(). The next optimisation adjusts everything; a full one of an earlier
+  // snapshot is no longer taken in.
+  void shift_disparities(CameraId camera, double by, KeyframeId first = KeyframeId(0));
+
+  // What is known of a stereo camera by now; see Map.
+  void set_correction(CameraId camera, const RigCorrection& correction);
 
   // Improves the map after the newest keyframe was added, by the method of the options; outlier
   // observations are erased from the map. Looks at `stop` between iterations and keeps what it has

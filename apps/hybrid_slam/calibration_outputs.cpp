@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
 #include "cameras/files/output_file.h"
 
@@ -26,9 +27,38 @@ void judge_rows(const RigFindings& rig, std::vector<std::string>& reasons) {
         100 * rig.alignment->focal_ratio));
   }
   const double rows = rig.rows.systematic_rms();
-  if (rows > PairAlignment::kHarmlessRows) {
+  if (rows > kHarmlessRows) {
     reasons.push_back(fmt::format("rows are {:.2f} px off by place in the image", rows));
   }
+}
+
+std::string text_of(const std::optional<FoundParameter>& found, const char* unit) {
+  if (!found) return "nothing";
+  return fmt::format("{:.3f} +- {:.3f}{}", found->value,
+                     std::hypot(found->sigma, found->systematic), unit);
+}
+
+std::string text_of(const std::optional<PairAlignment>& rows) {
+  return rows ? fmt::format("{:.2f} px", rows->row_rms) : "nothing";
+}
+
+// What the run has found wins.
+std::vector<std::string> changes_of(const RigFindings& rig) {
+  std::vector<std::string> changes;
+  const RigCorrection& before = rig.of_map;
+  if (rig.changed.rows) {
+    changes.push_back(fmt::format("rows are off by {} now, by {} when the map was made",
+                                  text_of(rig.alignment), text_of(before.rows)));
+  }
+  if (rig.changed.disparity) {
+    changes.push_back(fmt::format("disparities are off by {} now, by {} when the map was made",
+                                  text_of(rig.disparity, " px"), text_of(before.disparity, " px")));
+  }
+  if (rig.changed.shading) {
+    changes.push_back(fmt::format("the shading depth is {} now, {} when the map was made",
+                                  text_of(rig.shading, ""), text_of(before.shading, "")));
+  }
+  return changes;
 }
 
 // Where an offset is in use it is no accident: DisparityCalibrator sees to that.
@@ -38,6 +68,21 @@ void judge_disparities(const RigFindings& rig, std::vector<std::string>& reasons
   if (scale <= kDoubtfulScale) return;
   reasons.push_back(fmt::format("disparities are {:.2f} px off, {:.1f} % of the scale (taken out)",
                                 rig.disparity_offset, 100 * scale));
+}
+
+void judge_lens(const MapSnapshot& map, CalibrationFigures& figures) {
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    if (!(baseline(map.camera(CameraId(i))) > 0)) continue;
+    figures.lens = find_lens_error(map, CameraId(i), FloorFinder::kMost);
+  }
+  if (!figures.lens || !figures.lens->is_shown()) return;
+  const LensError& lens = *figures.lens;
+  figures.reasons.push_back(
+      fmt::format("lenses distort by {:+.2f} +- {:.2f} % more at the corner than calibrated, which "
+                  "makes the way "
+                  "{:.1f} % too {}",
+                  100 * lens.corner, 100 * std::abs(lens.corner * lens.sigma / lens.distortion),
+                  100 * std::abs(lens.scale - 1), lens.scale > 1 ? "long" : "short"));
 }
 
 void judge_residuals(const MapSnapshot& map, CalibrationFigures& figures) {
@@ -57,6 +102,13 @@ std::string field(double value) {
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
+Json to_json(const std::optional<FoundParameter>& found) {
+  if (!found) return {};
+  return {{"value", found->value},
+          {"sigma", std::hypot(found->sigma, found->systematic)},
+          {"in_use", found->in_use}};
+}
+
 }  // namespace
 
 CalibrationFigures calibration_figures(const MapSnapshot& map, const RigFindings* rig) {
@@ -68,10 +120,12 @@ CalibrationFigures calibration_figures(const MapSnapshot& map, const RigFindings
   if (rig != nullptr) {
     figures.rig = *rig;
     figures.stereo = true;
+    figures.changes = changes_of(*rig);
     judge_rows(*rig, figures.reasons);
     judge_disparities(*rig, figures.reasons);
   }
   judge_residuals(map, figures);
+  judge_lens(map, figures);
   return figures;
 }
 
@@ -79,6 +133,7 @@ Json to_json(const CalibrationFigures& figures) {
   Json json;
   json["doubtful"] = !figures.reasons.empty();
   json["reasons"] = figures.reasons;
+  json["changes"] = figures.changes;
   if (figures.stereo) {
     const RigFindings& rig = figures.rig;
     if (rig.alignment) {
@@ -94,6 +149,19 @@ Json to_json(const CalibrationFigures& figures) {
     json["disparity_offset_px"] = rig.disparity_offset;
     json["disparity_offset_sigma_px"] = number(rig.disparity_sigma);
     json["median_disparity_px"] = rig.median_disparity;
+    json["disparity"] = to_json(rig.disparity);
+    json["shading"] = to_json(rig.shading);
+    json["of_map"] = {{"rows_px", rig.of_map.rows ? Json(rig.of_map.rows->row_rms) : Json()},
+                      {"disparity", to_json(rig.of_map.disparity)},
+                      {"shading", to_json(rig.of_map.shading)}};
+  }
+  if (const auto& lens = figures.lens) {
+    json["lens"] = {{"distortion", lens->distortion},
+                    {"sigma", lens->sigma},
+                    {"corner", lens->corner},
+                    {"scale", lens->scale}};
+  } else {
+    json["lens"] = Json();
   }
   Json& systematic = json["systematic_px"] = Json::array();
   for (const SystematicPart& part : figures.systematic) {

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "backend/map/map_snapshot.h"
+#include "frontend/calibration/lens_error.h"
 #include "frontend/calibration/rig_calibrator.h"
 
 namespace hybrid_slam {
@@ -16,8 +18,11 @@ struct CalibrationFigures {
   std::vector<ResidualMap> maps;  // by camera, of all its keyframes
   std::vector<SystematicPart> systematic;
   RigFindings rig;
+  std::optional<LensError> lens;     // of the stereo pair
   bool stereo = false;               // `rig` says something
   std::vector<std::string> reasons;  // why the rig should be calibrated again; empty: it need not
+  // In what the rig is another one than that of the map which the run went on with.
+  std::vector<std::string> changes;
 };
 
 // `rig` may be null.

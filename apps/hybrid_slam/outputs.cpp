@@ -115,6 +115,9 @@ FigureTables write_tables(const std::filesystem::path& out, const RunResult& res
   write_coverage(out / "coverage.csv", tables.coverage);
   tables.calibration = calibration_figures(map, result.rig.get());
   write_calibration(out / "calibration.csv", map, tables.calibration);
+  for (const std::string& change : tables.calibration.changes) {
+    spdlog::warn("the rig is not as the map says, which this run does not follow: {}", change);
+  }
   // Two streams of which one is seconds late look like this.
   for (const std::string& reason : tables.calibration.reasons) {
     spdlog::warn(

@@ -7,6 +7,7 @@
 
 #include "apps/io/ply.h"
 #include "apps/map_tool/colmap_export.h"
+#include "apps/map_tool/map_info.h"
 #include "apps/map_tool/nerfstudio_export.h"
 #include "apps/map_tool/trajectory_export.h"
 #include "backend/map/components.h"
@@ -66,6 +67,7 @@ class Export {
           fmt::format("component {}: {} keyframes, to {}", component.value, size, folder.string()));
     }
     write_images();
+    tell_corrections();
     return std::move(told_);
   }
 
@@ -101,6 +103,15 @@ class Export {
     if (written == 0) return;
     told_.push_back(fmt::format("{} rectified images, which the map is of, to {}", written,
                                 (options_.out / "images").string()));
+  }
+
+  // No format of these has a place for it.
+  void tell_corrections() {
+    for (std::uint32_t i = 0; i < map_.camera_count(); ++i) {
+      for (const std::string& line : correction_lines(map_.correction(CameraId(i)))) {
+        told_.push_back(fmt::format("camera {}, not in the export: {}", i, line));
+      }
+    }
   }
 
   const MapSnapshot& map_;

@@ -32,6 +32,7 @@ std::vector<MapCameraInfo> cameras_of(const MapSnapshot& map) {
   const std::vector<ResidualSummary> residuals = residuals_by_camera(map);
   for (std::uint32_t i = 0; i < cameras.size(); ++i) {
     cameras[i].camera = map.camera(CameraId(i));
+    cameras[i].correction = map.correction(CameraId(i));
     cameras[i].landmarks = seen[i].size();
     cameras[i].residuals = residuals[i];
   }

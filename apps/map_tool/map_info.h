@@ -19,6 +19,7 @@ struct TimeSpan {
 
 struct MapCameraInfo {
   Camera camera;
+  RigCorrection correction;
   std::size_t keyframes = 0;
   std::size_t features = 0;   // that the map still holds
   std::size_t landmarks = 0;  // that it observes
@@ -66,6 +67,9 @@ MapInfo map_info(const MapSnapshot& map, const MapFileInfo& file);
 std::string to_text(const MapInfo& info);
 
 nlohmann::ordered_json to_json(const MapInfo& info);
+
+// What was found out about a camera, a line each; nothing of most.
+std::vector<std::string> correction_lines(const RigCorrection& correction);
 
 // The names of a model's parameters, in their order.
 std::vector<std::string> parameter_names(const Camera& camera);

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <numeric>
 
 #include "apps/map_tool/map_info.h"
@@ -10,6 +12,8 @@ namespace hybrid_slam {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
 
 std::vector<std::string> parameters_of(std::string_view model) {
   if (model == Pinhole::kName) return {"fx", "fy", "cx", "cy"};
@@ -52,6 +56,9 @@ void add_camera(std::size_t id, const MapCameraInfo& info, Lines& lines) {
     numbers += fmt::format("{}{} {:.6g}", i == 0 ? "" : ", ", names[i], values_of(info.camera)[i]);
   }
   lines.add("  calibration {}", numbers);
+  for (const std::string& line : correction_lines(info.correction)) {
+    lines.add("  found       {}", line);
+  }
   if (info.keyframes == 0) return;
   lines.add("  keyframes   {}, {}", info.keyframes, span_text(info.time));
   lines.add("  sees        {} landmarks by {} observations; {} features in the map", info.landmarks,
@@ -79,6 +86,33 @@ void add_component(const MapComponentInfo& info, Lines& lines) {
       info.area.footprint, info.area.cell, info.area.hull, info.area.length, info.area.width);
 }
 
+Json rows_json(const std::optional<PairAlignment>& rows) {
+  if (!rows) return {};
+  return {{"pitch_deg", kDegrees * rows->pitch},
+          {"pitch_sigma_deg", kDegrees * rows->pitch_sigma},
+          {"roll_deg", kDegrees * rows->roll},
+          {"roll_sigma_deg", kDegrees * rows->roll_sigma},
+          {"focal_ratio", 1 + rows->focal_ratio},
+          {"focal_ratio_sigma", rows->focal_sigma},
+          {"rows_px", rows->row_rms},
+          {"row_sigma_px", rows->row_sigma},
+          {"matches", rows->matches}};
+}
+
+Json parameter_json(const std::optional<FoundParameter>& found) {
+  if (!found) return {};
+  return {{"value", found->value},
+          {"sigma", found->sigma},
+          {"systematic", found->systematic},
+          {"in_use", found->in_use}};
+}
+
+Json correction_json(const RigCorrection& correction) {
+  return {{"rows", rows_json(correction.rows)},
+          {"disparity_offset_px", parameter_json(correction.disparity)},
+          {"shading_depth", parameter_json(correction.shading)}};
+}
+
 Json span_json(const TimeSpan& span) { return {{"first_s", span.first}, {"last_s", span.last}}; }
 
 Json camera_json(std::size_t id, const MapCameraInfo& info) {
@@ -90,6 +124,7 @@ Json camera_json(std::size_t id, const MapCameraInfo& info) {
           {"width", image_width(info.camera)},
           {"height", image_height(info.camera)},
           {"parameters", parameters},
+          {"found", correction_json(info.correction)},
           {"keyframes", info.keyframes},
           {"features", info.features},
           {"landmarks", info.landmarks},
@@ -125,6 +160,26 @@ std::vector<std::string> parameter_names(const Camera& camera) {
     names.push_back(fmt::format("p{}", i));
   }
   return names;
+}
+
+std::vector<std::string> correction_lines(const RigCorrection& correction) {
+  std::vector<std::string> lines;
+  if (const auto& rows = correction.rows) {
+    lines.push_back(fmt::format(
+        "right camera turned by {:.3f} +- {:.3f} deg about x, {:.3f} +- {:.3f} deg about z, focal "
+        "length {:+.2f} +- {:.2f} %; taken out of its images",
+        kDegrees * rows->pitch, kDegrees * rows->pitch_sigma, kDegrees * rows->roll,
+        kDegrees * rows->roll_sigma, 100 * rows->focal_ratio, 100 * rows->focal_sigma));
+  }
+  const auto add = [&](const char* name, const std::optional<FoundParameter>& found) {
+    if (!found) return;
+    lines.push_back(fmt::format(
+        "{} {:.3f} +- {:.3f}, {}", name, found->value, std::hypot(found->sigma, found->systematic),
+        found->in_use == 0 ? "not in use" : fmt::format("{:.3f} in use", found->in_use)));
+  };
+  add("offset of the disparities [px]", correction.disparity);
+  add("shading depth over size", correction.shading);
+  return lines;
 }
 
 std::string to_text(const MapInfo& info) {

@@ -66,24 +66,52 @@ std::optional<StereoImages> quietened(const StereoImages& images) {
   return quiet;
 }
 
-// How the right camera stands, by the first pairs. By the first alone where that shows nothing to
-// be taken out: then it costs one pair without upsampling.
-std::shared_ptr<const PairAlignment> find_alignment(const Calibrated<RectifiedStereo>& camera,
-                                                    const SlamOptions& options,
-                                                    const FirstImages& first) {
-  SiftOptions plain = options.sift;
-  plain.upsample = false;
-  const auto sift = make_sift(plain);
-  std::vector<PairMatch> matches;
-  std::optional<PairAlignment> found;
-  for (const auto& images : first.stereo) {
-    const std::vector<PairMatch> pair =
-        match_pair(sift->extract(images->left, nullptr), sift->extract(images->right, nullptr));
-    matches.insert(matches.end(), pair.begin(), pair.end());
-    found = find_pair_alignment(camera, matches);
-    if (found && !found->is_shown()) break;
+// The matches of the first pairs, one pair after the other.
+class FirstMatches {
+ public:
+  FirstMatches(const SlamOptions& options, const FirstImages& first) : first_(first) {
+    SiftOptions plain = options.sift;
+    plain.upsample = false;
+    sift_ = make_sift(plain);
   }
-  return found && found->is_shown() ? std::make_shared<const PairAlignment>(*found) : nullptr;
+
+  // With the next pair's; false if there is none.
+  bool add_pair() {
+    if (next_ == first_.stereo.size()) return false;
+    const StereoImages& images = *first_.stereo[next_++];
+    const std::vector<PairMatch> pair =
+        match_pair(sift_->extract(images.left, nullptr), sift_->extract(images.right, nullptr));
+    matches_.insert(matches_.end(), pair.begin(), pair.end());
+    return true;
+  }
+  std::span<const PairMatch> all() const { return matches_; }
+
+ private:
+  const FirstImages& first_;
+  std::unique_ptr<SiftExtractor> sift_;
+  std::size_t next_ = 0;
+  std::vector<PairMatch> matches_;
+};
+
+// How the right camera stands, by the first pairs. By the first alone where that shows nothing to
+// be taken out, or nothing but what is known: then it costs one pair without upsampling.
+SettledAlignment find_alignment(const Calibrated<RectifiedStereo>& camera,
+                                const SlamOptions& options, const FirstImages& first,
+                                const std::optional<PairAlignment>& known) {
+  if (!options.align_pair) return {};
+  FirstMatches matches(options, first);
+  std::optional<PairAlignment> left_over;
+  while (matches.add_pair()) {
+    left_over = find_pair_alignment(
+        camera, known ? aligned(camera, *known, matches.all())
+                      : std::vector<PairMatch>(matches.all().begin(), matches.all().end()));
+    if (left_over && !is_shown(*left_over)) break;
+  }
+  const bool shown = left_over && is_shown(*left_over);
+  if (known && !shown) return {std::make_shared<const PairAlignment>(*known), false};
+  const auto found = known && shown ? find_pair_alignment(camera, matches.all()) : left_over;
+  if (!found || !is_shown(*found)) return {nullptr, known.has_value()};
+  return {std::make_shared<const PairAlignment>(*found), known.has_value()};
 }
 
 bool hardly_matches(const StereoFeatures& features) {
@@ -95,15 +123,16 @@ bool hardly_matches(const StereoFeatures& features) {
 }  // namespace
 
 FrameExtractor::FrameExtractor(const CameraRig& cameras, const SlamOptions& options,
-                               SiftDevice device, const FirstImages& first)
+                               SiftDevice device, const FirstImages& first,
+                               const std::optional<PairAlignment>& known)
     : cameras_(cameras),
       options_(options),
       upsampling_(choose_upsampling(cameras, first.stereo, options_)),
-      alignment_(options.align_pair ? find_alignment(cameras.stereo, options_, first) : nullptr),
+      alignment_(find_alignment(cameras.stereo, options_, first, known)),
       sift_(std::make_unique<SiftPool>(device, options_.sift, 2)),
       left_mask_(read_mask(options.masks.left, cameras.stereo)),
       right_mask_(read_mask(options.masks.right, cameras.stereo)) {
-  if (alignment_) aligner_.emplace(cameras.stereo, *alignment_);
+  if (alignment_.taken_out) aligner_.emplace(cameras.stereo, *alignment_.taken_out);
   if (!cameras.fisheye) return;
   fisheye_sift_ = std::make_unique<SiftPool>(device, fisheye_sift(options_), 1);
   std::vector<GrayImage> examples;
@@ -149,7 +178,8 @@ CameraFrame FrameExtractor::extract(const StereoImages& input, bool check_pair, 
                          std::nullopt,
                          0,
                          0,
-                         alignment_};
+                         alignment_.taken_out,
+                         alignment_.changed};
   if (check_pair || hardly_matches(features)) {
     evidence.pair = hybrid_slam::check_pair(features.left, features.right);
   }

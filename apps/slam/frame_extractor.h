@@ -26,14 +26,22 @@ struct FirstImages {
   static constexpr std::size_t kFisheye = 3;
 };
 
+// How right images are re-warped.
+struct SettledAlignment {
+  std::shared_ptr<const PairAlignment> taken_out;  // null: nothing is
+  bool changed = false;                            // it is another one than the map says
+};
+
 // Makes frames of images: SIFT in all of them, stereo matching, contrast and mask of the fisheye.
 // Several threads at a time.
 class FrameExtractor {
  public:
-  // Settles upsampling and what the fisheye shows of the world by the first images. Throws
-  // InputError as make_fisheye_mask() does, and for masks that cannot be used.
+  // Settles upsampling, what is taken out of right images and what the fisheye shows of the world
+  // by the first images. `known`: how the right camera stood when the map was made, if anything was
+  // taken out; it still is, unless the first images contradict. Throws InputError as
+  // make_fisheye_mask() does, and for masks that cannot be used.
   FrameExtractor(const CameraRig& cameras, const SlamOptions& options, SiftDevice device,
-                 const FirstImages& first);
+                 const FirstImages& first, const std::optional<PairAlignment>& known = {});
   ~FrameExtractor();
 
   // `check_pair`: whether the images are a pair is looked at in any case; else only where hardly
@@ -50,8 +58,8 @@ class FrameExtractor {
   CameraRig cameras_;
   SlamOptions options_;
   UpsamplingEvidence upsampling_;
-  std::shared_ptr<const PairAlignment> alignment_;  // taken out of right images; null: nothing is
-  std::optional<RightAligner> aligner_;             // likewise
+  SettledAlignment alignment_;           // taken out of right images
+  std::optional<RightAligner> aligner_;  // likewise
   std::unique_ptr<SiftPool> sift_;
   std::unique_ptr<SiftPool> fisheye_sift_;  // null without a fisheye
   GrayImage left_mask_;                     // empty: all of the image shows the world

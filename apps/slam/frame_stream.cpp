@@ -177,7 +177,8 @@ void FrameStream::make_extractor(Lock& lock) {
   starting_ = true;
   const FirstImages first = first_;
   lock.unlock();
-  auto made = std::make_unique<FrameExtractor>(cameras_, options_, stream_.device, first);
+  auto made = std::make_unique<FrameExtractor>(cameras_, options_, stream_.device, first,
+                                               stream_.known_alignment);
   lock.lock();
   extractor_ = std::move(made);
   first_ = {};

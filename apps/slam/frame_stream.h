@@ -23,6 +23,7 @@ struct FrameStreamOptions {
   // Whether who pushes faster than frames are taken loses the oldest that waits; else they wait.
   bool drop = false;
   SiftDevice device = SiftDevice::kCpu;
+  std::optional<PairAlignment> known_alignment{};  // see FrameExtractor
 };
 
 // How many inputs there were, of one camera.

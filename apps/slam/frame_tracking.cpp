@@ -77,7 +77,7 @@ FrameTracking::FrameTracking(const CameraRig& cameras, const SlamOptions& option
                              Observers& observers, StageTimes& times)
     : places_(std::make_shared<KeyframeDatabase>(vocabulary)),
       stereo_(mapping.camera_id(cameras.stereo), cameras.stereo, stereo_options(cameras, options),
-              places_),
+              places_, mapping.map().view().correction(mapping.camera_id(cameras.stereo))),
       observers_(observers),
       times_(times),
       localize_(localize),
@@ -86,6 +86,8 @@ FrameTracking::FrameTracking(const CameraRig& cameras, const SlamOptions& option
       stereo_floor_(mapping.camera_id(cameras.stereo)),
       lamps_(cameras.fisheye.has_value()) {
   rig_.rows = RowField(cameras.stereo.width, cameras.stereo.height);
+  rig_.of_map = mapping.map().view().correction(mapping.camera_id(cameras.stereo));
+  rig_.alignment = rig_.of_map.rows;
   if (localize_ && !mapping.map().view().origin().valid()) {
     throw std::logic_error("FrameTracking: nothing to localise in");
   }
@@ -137,9 +139,13 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
   observers_.frame(std::move(result));
   if (!keyframe) return std::nullopt;
   const KeyframeId reference = keyframe->reference;
-  return MappingJob{frame.camera, std::move(*keyframe),
-                    reference.valid() ? map.cam_from_world(reference) : Rigid3d(), counts_.take(),
-                    offset};
+  return MappingJob{frame.camera,
+                    std::move(*keyframe),
+                    reference.valid() ? map.cam_from_world(reference) : Rigid3d(),
+                    counts_.take(),
+                    offset,
+                    correction(),
+                    stereo_.disparity().estimate().contradicts_start()};
 }
 
 // What the pair itself shows, before anything is corrected by the map.
@@ -147,7 +153,10 @@ void FrameTracking::learn_calibration(const CameraFrame& frame) {
   if (frame.camera != CameraKind::kStereo) return;
   add_rows(frame.frame.features, rig_.rows);
   rig_.median_disparity = median_disparity(frame.frame.features.left, frame.frame.features.u_right);
+  if (frame.evidence.images.empty()) return;  // features alone
+  rig_.alignment.reset();
   if (frame.evidence.alignment) rig_.alignment = *frame.evidence.alignment;
+  rig_.changed.rows = frame.evidence.alignment_changed;
 }
 
 // Raises the frame's standard deviations by what lies under them, where that is known.
@@ -167,7 +176,20 @@ void FrameTracking::follow_calibration(CameraFrame& frame, const MapSnapshot& ma
 std::shared_ptr<const RigFindings> FrameTracking::findings(const TrackedFrame& tracked) {
   rig_.disparity_offset = tracked.disparity_offset;
   rig_.disparity_sigma = stereo_.disparity().sigma();
+  rig_.disparity = stereo_.disparity().estimate().found();
+  rig_.shading = stereo_.shading_estimate().found();
+  rig_.changed.disparity = stereo_.disparity().estimate().contradicts_start();
+  rig_.changed.shading = stereo_.shading_estimate().contradicts_start();
   return std::make_shared<const RigFindings>(rig_);
+}
+
+// Of a calibrator that is turned off, what the map says stays.
+RigCorrection FrameTracking::correction() const {
+  RigCorrection known = rig_.of_map;
+  known.rows = rig_.alignment;
+  if (rig_.disparity) known.disparity = rig_.disparity;
+  if (rig_.shading) known.shading = rig_.shading;
+  return known;
 }
 
 // Where both cameras have a pose of this moment.

@@ -40,6 +40,7 @@ class FrameTracking {
   void follow_calibration(CameraFrame& frame, const MapSnapshot& map);
   void learn_calibration(const CameraFrame& frame);
   std::shared_ptr<const RigFindings> findings(const TrackedFrame& tracked);
+  RigCorrection correction() const;
   void doubt_lamps(CameraKind camera, const MapSnapshot& map, TrackedFrame& tracked);
   TrackedFrame track_by_camera(CameraFrame& frame, const MapSnapshot& map, bool allow_keyframe);
 

@@ -79,6 +79,7 @@ struct FrameEvidence {
   int dropped = 0;                   // likewise, for want of time
   // What was taken out of the right image, see PairAlignment; null: nothing.
   std::shared_ptr<const PairAlignment> alignment{};
+  bool alignment_changed = false;  // it is another one than the map says
 };
 
 // An input that will not be tracked.

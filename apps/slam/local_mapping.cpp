@@ -48,7 +48,8 @@ LocalMapping::LocalMapping(const SlamOptions& options, Map map)
     : options_(options),
       backend_(options.backend, std::move(map)),
       probation_(options.culling),
-      use_(options.culling, backend_.view()) {}
+      use_(options.culling, backend_.view()),
+      first_own_(backend_.view().next_keyframe_id()) {}
 
 CameraId LocalMapping::camera_id(const Camera& camera) {
   const MapSnapshot& map = backend_.view();
@@ -64,7 +65,11 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   MapEdit counts;
   counts.counted = job.counts;
   backend_.apply(counts);
-  take_offset_out(job);
+  if (job.camera == CameraKind::kStereo) {
+    begin_with_offset(job);
+    take_offset_out(job);
+    backend_.set_correction(job.keyframe.observations->camera, job.correction);
+  }
   const KeyframeId id = backend_.add(carried_along(job, backend_.view()));
   backend_.apply(probation_.cull(backend_.view(), id));
   clock.lap("insert_keyframe");
@@ -83,17 +88,28 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   return id;
 }
 
+// Of a map that does not say what was taken out of its keyframes, and of one that was made by a
+// pair that stood otherwise, these stay as they are.
+void LocalMapping::begin_with_offset(const MappingJob& job) {
+  if (!disparity_offset_) {
+    const auto known = backend_.view().correction(job.keyframe.observations->camera).disparity;
+    disparity_offset_ = known ? known->in_use : 0;
+    first_with_offset_ = known ? KeyframeId(0) : first_own_;
+  }
+  if (job.offset_changed) first_with_offset_ = first_own_;
+}
+
 // What was found out about the pair meanwhile holds for all its keyframes, not for the new ones
 // alone. Of a rig that is hardly off, it is left to those to come: less than the map may be off by
 // anyway is not worth moving all of it.
 void LocalMapping::take_offset_out(const MappingJob& job) {
-  if (job.camera != CameraKind::kStereo) return;
-  const double by = job.disparity_offset - disparity_offset_;
-  const double most = std::max(std::abs(job.disparity_offset), std::abs(disparity_offset_));
+  const double before = disparity_offset_.value();
+  const double by = job.disparity_offset - before;
+  const double most = std::max(std::abs(job.disparity_offset), std::abs(before));
   const FrameObservations& seen = *job.keyframe.observations;
   const double disparity = median_disparity(seen.features, seen.u_right);
   if (by == 0 || !(disparity > 0) || most < kDoubtfulScale * disparity) return;
-  backend_.shift_disparities(seen.camera, by);
+  backend_.shift_disparities(seen.camera, by, first_with_offset_);
   if (options_.backend.full.enabled) backend_.optimize_full();
   disparity_offset_ = job.disparity_offset;
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct MappingJob {
   Rigid3d reference_from_world;  // pose of keyframe.reference in the map it was tracked in
   std::vector<LandmarkCount> counts;
   double disparity_offset = 0;  // [px] that was taken out of a stereo keyframe's disparities
+  RigCorrection correction{};   // what is known of the stereo pair by now
+  bool offset_changed = false;  // it is another one than the map says: see RunningEstimate
 
   std::int64_t frame_index() const { return keyframe.observations->frame_index; }
 };
@@ -78,13 +81,17 @@ class LocalMapping {
   const Map& map() const { return backend_.map(); }
 
  private:
+  void begin_with_offset(const MappingJob& job);
   void take_offset_out(const MappingJob& job);
 
   SlamOptions options_;
   Backend backend_;
   LandmarkProbation probation_;
   KeyframeUse use_;
-  double disparity_offset_ = 0;  // [px] that was taken out of all stereo keyframes
+  KeyframeId first_own_;  // what is before it was in the map that this goes on with
+  // [px] that was taken out of all stereo keyframes from this one on.
+  std::optional<double> disparity_offset_;
+  KeyframeId first_with_offset_;
 };
 
 }  // namespace hybrid_slam

@@ -18,7 +18,16 @@
 namespace hybrid_slam {
 namespace {
 
-FrameStreamOptions stream_options(const SessionOptions& session) {
+// What is known of the right camera by the map that the session goes on with.
+std::optional<PairAlignment> known_alignment(const MapSnapshot& map, const CameraRig& cameras) {
+  for (std::uint32_t i = 0; i < map.camera_count(); ++i) {
+    if (map.camera(CameraId(i)) == Camera(cameras.stereo)) return map.correction(CameraId(i)).rows;
+  }
+  return std::nullopt;
+}
+
+FrameStreamOptions stream_options(const SessionOptions& session,
+                                  std::optional<PairAlignment> known_alignment) {
   const bool realtime = session.mode == SessionMode::kRealtime;
   const Nanoseconds window = realtime ? 50'000'000 : 500'000'000;
   FrameStreamOptions stream;
@@ -26,6 +35,7 @@ FrameStreamOptions stream_options(const SessionOptions& session) {
   stream.threads = session.threads;
   stream.drop = realtime && session.drop;
   stream.device = session.device;
+  stream.known_alignment = known_alignment;
   return stream;
 }
 
@@ -49,7 +59,8 @@ class Session::Work {
         observers_(SessionLog::before(std::move(observers)),
                    session_.mode == SessionMode::kRealtime, inner()),
         core_((require_valid(options), make_core(std::move(map)))),
-        stream_(cameras, options, stream_options(session_)),
+        stream_(cameras, options,
+                stream_options(session_, known_alignment(*core_->map(), cameras))),
         thread_([this] { work(); }) {}
 
   ~Work() { cancel(); }

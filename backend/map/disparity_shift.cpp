@@ -57,16 +57,17 @@ std::shared_ptr<const Odometry> scaled(const std::shared_ptr<const Odometry>& od
 
 }  // namespace
 
-double shift_disparities(Map& map, CameraId camera, double by) {
+double shift_disparities(Map& map, CameraId camera, double by, KeyframeId first) {
   const MapSnapshot& view = map.view();
   if (view.newest_keyframe(camera) == nullptr || by == 0) return 1;
   std::vector<double> ratios;
   std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
   std::vector<std::pair<KeyframeId, Rigid3d>> poses;
   for (const LandmarkId id : view.landmark_ids()) {
-    ratios.push_back(depth_ratio(view, view.at(id), camera, by));
+    const Landmark& landmark = view.at(id);
+    ratios.push_back(landmark.reference < first ? 1 : depth_ratio(view, landmark, camera, by));
   }
-  const double scale = median(ratios);
+  const double scale = first == KeyframeId(0) ? median(ratios) : 1;
   std::size_t next = 0;
   for (const LandmarkId id : view.landmark_ids()) {
     const Landmark& landmark = view.at(id);
@@ -82,7 +83,7 @@ double shift_disparities(Map& map, CameraId camera, double by) {
   for (const KeyframeId id : view.keyframe_ids()) {
     Keyframe& keyframe = tables.keyframes.edit(id.value);
     keyframe.odometry = scaled(keyframe.odometry, scale);
-    if (keyframe.observations->camera != camera) continue;
+    if (keyframe.observations->camera != camera || id < first) continue;
     keyframe.observations = shifted(*keyframe.observations, by);
   }
   for (std::uint32_t id = 0; id < tables.next_keyframe; ++id) {

@@ -9,6 +9,9 @@ namespace hybrid_slam {
 // 0.1 px. Points follow by the disparity in their reference keyframe, the map as a whole (poses,
 // odometry) by the median of them, about the world's origin: a start for an optimisation, which has
 // to follow. Returns that median; 1, and nothing is done, if the map has no keyframe of the camera.
-double shift_disparities(Map& map, CameraId camera, double by);
+//
+// `first`: keyframes before it were made by the camera as it was then; they stay as they are, and
+// so do all poses.
+double shift_disparities(Map& map, CameraId camera, double by, KeyframeId first = KeyframeId(0));
 
 }  // namespace hybrid_slam

@@ -177,6 +177,16 @@ void Map::set_camera(CameraId id, const Camera& camera) {
   }
 }
 
+void Map::set_correction(CameraId id, const RigCorrection& correction) {
+  MapTables& tables = view_.tables_;
+  require(baseline(tables.cameras.at(id.value)) > 0, "Map::set_correction: no stereo camera");
+  if (correction.empty()) {
+    tables.corrections.erase(id);
+  } else {
+    tables.corrections[id] = correction;
+  }
+}
+
 void Map::set_keep(KeyframeId id) {
   auto& keyframes = view_.tables_.keyframes;
   if (keyframes.find(id.value) != nullptr) keyframes.edit(id.value).keep = true;

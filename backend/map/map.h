@@ -35,6 +35,9 @@ class Map {
   void set_camera(CameraId id, const Camera& camera);  // refined intrinsics
   void set_keep(KeyframeId id);                        // exempt from culling
 
+  // What is known of a stereo camera by now. Nothing that was measured changes.
+  void set_correction(CameraId id, const RigCorrection& correction);
+
   // What an optimiser knows of how certain the poses are; null: nothing.
   void set_covariances(std::shared_ptr<const KeyframeCovariances> covariances);
 

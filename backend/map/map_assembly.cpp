@@ -63,7 +63,20 @@ class MapAssembly {
       const std::int64_t newest = map.newest_frame_index(CameraId(i));
       std::int64_t& stored = tables_.newest_frame_index[cameras_.back().value];
       if (newest >= 0) stored = std::max(stored, first_frame_ + newest);
+      add_correction(map, CameraId(i));
     }
+  }
+
+  // Rigs change from dive to dive: the last one's holds.
+  void add_correction(const MapSnapshot& map, CameraId from) {
+    const RigCorrection correction = map.correction(from);
+    const Keyframe* const newest = map.newest_keyframe(from);
+    if (correction.empty() || newest == nullptr) return;
+    const double time = newest->observations->time;
+    const auto [known, first] = corrected_at_.try_emplace(cameras_.back(), time);
+    if (!first && time < known->second) return;
+    known->second = time;
+    tables_.corrections[cameras_.back()] = correction;
   }
 
   std::shared_ptr<const FrameObservations> renamed(
@@ -187,6 +200,7 @@ class MapAssembly {
   std::optional<DescriptorKind> kind_;
   std::vector<KeyframeId> first_stereo_;  // of each part
   std::int64_t first_frame_ = 0;
+  std::map<CameraId, double> corrected_at_;  // time of the newest keyframe [s]
   // Of the part that is being added.
   std::vector<CameraId> cameras_;
   std::map<KeyframeId, KeyframeId> new_ids_;

@@ -19,7 +19,8 @@ struct MapPart {
 
 // One map of parts of maps. Keyframes and landmarks count from 0, part by part, in the order that
 // they had. Poses, points, measurements and counters are taken as they are, each in the world of
-// its own map: nothing is moved. Cameras of the same numbers are one. Frames of a part are counted
+// its own map: nothing is moved. Cameras of the same numbers are one; of what was found out about
+// it (RigCorrection), what the part of its newest keyframe says holds. Frames of a part are counted
 // on from those of the parts before, their times stay. What is left out leaves nothing behind:
 // odometry goes on over a keyframe that is gone, and the spanning tree is made anew.
 //

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -20,6 +21,7 @@ namespace {
 constexpr std::size_t kSingleSections = 3;  // info, cameras, state
 constexpr std::uint32_t kOdometryVersion = 3;
 constexpr std::uint32_t kDroppedVersion = 4;
+constexpr std::uint32_t kCorrectionsVersion = 5;
 constexpr std::size_t kNumbersPerKeypoint = 6;
 constexpr std::uint32_t kMaxCount = 1'000'000'000;  // of frames: the sum of two is an int
 constexpr double kMaxNormError = 1e-6;              // of a quaternion
@@ -140,6 +142,44 @@ Matrix6d read_covariance(ByteReader& in) {
   return covariance;
 }
 
+// Angles for which the images of the pair still show the same scene, one upright as the other.
+constexpr double kMaxAngle = std::numbers::pi / 4;
+
+double read_sigma(ByteReader& in, const char* what) {
+  const double sigma = read_finite(in, what);
+  if (sigma < 0) in.fail(std::string(what) + " has a negative standard deviation");
+  return sigma;
+}
+
+std::optional<PairAlignment> read_rows(ByteReader& in) {
+  if (!read_flag(in)) return std::nullopt;
+  PairAlignment rows;
+  for (double* const value : {&rows.pitch, &rows.roll, &rows.focal_ratio}) {
+    *value = read_finite(in, "alignment of a pair");
+    if (std::abs(*value) > kMaxAngle) in.fail("pair that cannot be aligned");
+  }
+  for (double* const sigma : {&rows.pitch_sigma, &rows.roll_sigma, &rows.focal_sigma}) {
+    *sigma = read_sigma(in, "alignment of a pair");
+  }
+  const auto matches = in.number<std::uint32_t>();
+  if (matches > kMaxCount) in.fail("more matches than a pair can have");
+  rows.matches = static_cast<int>(matches);
+  rows.row_rms = read_sigma(in, "alignment of a pair");
+  rows.row_sigma = read_sigma(in, "alignment of a pair");
+  return rows;
+}
+
+std::optional<FoundParameter> read_parameter(ByteReader& in) {
+  if (!read_flag(in)) return std::nullopt;
+  FoundParameter found;
+  found.value = read_finite(in, "parameter");
+  found.sigma = read_sigma(in, "parameter");
+  if (!(found.sigma > 0)) in.fail("parameter without a standard deviation");
+  found.systematic = read_sigma(in, "parameter");
+  found.in_use = read_finite(in, "parameter");
+  return found;
+}
+
 // Fills the tables section by section.
 class MapDecoder {
  public:
@@ -153,6 +193,8 @@ class MapDecoder {
       while (!in.at_end()) tables_.cameras.push_back(read_camera(in));
     } else if (section == kStateSection) {
       read_state(in);
+    } else if (section == kCorrectionsSection) {
+      while (!in.at_end()) read_correction(in);
     } else if (section == kKeyframesSection) {
       while (!in.at_end()) read_keyframe(in);
     } else if (section == kOdometrySection) {
@@ -170,6 +212,7 @@ class MapDecoder {
         tables_.landmarks.size() != landmarks_) {
       end.fail("keyframes or landmarks are missing");
     }
+    if (tables_.corrections.size() != corrections_) end.fail("corrections are missing");
     if (odometry_ != 0) end.fail("odometry is missing, or too much of it");
     link_tree(end);
     covisibility_.write(tables_.keyframes);
@@ -191,11 +234,27 @@ class MapDecoder {
     erased_ = in.number<std::uint32_t>();
     landmarks_ = in.number<std::uint32_t>();
     if (version_ >= kOdometryVersion) odometry_ = in.number<std::uint32_t>();
+    if (version_ >= kCorrectionsVersion) corrections_ = in.number<std::uint32_t>();
     // Every keyframe that ever was is there, or left a tombstone.
     if (std::uint64_t{keyframes_} + erased_ != tables_.next_keyframe) {
       in.fail("keyframes that were neither kept nor erased");
     }
     if (tables_.origin.valid() != (keyframes_ > 0)) in.fail("origin without keyframes, or none");
+  }
+
+  // Each camera once, whatever the number of sections.
+  void read_correction(ByteReader& in) {
+    const CameraId camera(in.number<std::uint32_t>());
+    if (camera.value >= tables_.cameras.size() || !(baseline(tables_.cameras[camera.value]) > 0)) {
+      in.fail("correction of a camera that is no stereo pair");
+    }
+    RigCorrection correction;
+    correction.rows = read_rows(in);
+    correction.disparity = read_parameter(in);
+    correction.shading = read_parameter(in);
+    if (correction.empty() || !tables_.corrections.emplace(camera, correction).second) {
+      in.fail("correction of nothing, or twice");
+    }
   }
 
   // Ascending within a table, and below the next one to be given.
@@ -300,7 +359,8 @@ class MapDecoder {
   std::optional<DescriptorKind> kind_;
   std::uint32_t version_;                                     // of the file
   std::uint32_t keyframes_ = 0, erased_ = 0, landmarks_ = 0;  // how many there shall be
-  std::uint32_t odometry_ = 0;                                // likewise, that are still to come
+  std::uint32_t corrections_ = 0;
+  std::uint32_t odometry_ = 0;  // likewise, that are still to come
   std::uint32_t next_keyframe_ = 0, next_erased_ = 0, next_landmark_ = 0;  // least id to come
   std::uint32_t next_odometry_ = 0;
 };

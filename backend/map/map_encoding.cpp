@@ -1,5 +1,6 @@
 #include "backend/map/map_encoding.h"
 
+#include <optional>
 #include <variant>
 
 #include "backend/map/byte_stream.h"
@@ -73,6 +74,26 @@ void write(ByteWriter& out, KeyframeId id, const Odometry& odometry) {
   out.number(odometry.dropped);
 }
 
+void write(ByteWriter& out, const std::optional<PairAlignment>& rows) {
+  out.number(std::uint8_t{rows.has_value()});
+  if (!rows) return;
+  for (const double value : {rows->pitch, rows->roll, rows->focal_ratio, rows->pitch_sigma,
+                             rows->roll_sigma, rows->focal_sigma}) {
+    out.number(value);
+  }
+  out.number(static_cast<std::uint32_t>(rows->matches));
+  out.number(rows->row_rms);
+  out.number(rows->row_sigma);
+}
+
+void write(ByteWriter& out, const std::optional<FoundParameter>& found) {
+  out.number(std::uint8_t{found.has_value()});
+  if (!found) return;
+  for (const double value : {found->value, found->sigma, found->systematic, found->in_use}) {
+    out.number(value);
+  }
+}
+
 // The descriptor is that of one of the observations and follows from them; the numbers would too,
 // but only a machine that rounds alike finds the same ones again.
 void write(ByteWriter& out, const Landmark& landmark) {
@@ -131,7 +152,17 @@ void encode_map(const MapTables& tables, const MapFileInfo& info, SectionFileWri
   tables.keyframes.for_each(
       [&](std::uint64_t, const Keyframe& k) { odometry += k.odometry != nullptr ? 1 : 0; });
   state.number(odometry);
+  state.number(static_cast<std::uint32_t>(tables.corrections.size()));
   file.add(kStateSection, state.content());
+
+  ByteWriter corrections;
+  for (const auto& [camera, correction] : tables.corrections) {
+    corrections.number(camera.value);
+    write(corrections, correction.rows);
+    write(corrections, correction.disparity);
+    write(corrections, correction.shading);
+  }
+  if (!corrections.content().empty()) file.add(kCorrectionsSection, corrections.content());
 
   encode_table(tables.keyframes, kKeyframesSection, file,
                [](ByteWriter& out, std::uint64_t, const Keyframe& k) { write(out, k); });

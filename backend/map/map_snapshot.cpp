@@ -23,6 +23,11 @@ const Landmark& MapSnapshot::at(LandmarkId id) const {
 
 const Camera& MapSnapshot::camera(CameraId id) const { return tables_.cameras.at(id.value); }
 
+RigCorrection MapSnapshot::correction(CameraId id) const {
+  const auto known = tables_.corrections.find(id);
+  return known == tables_.corrections.end() ? RigCorrection() : known->second;
+}
+
 const Camera& MapSnapshot::camera(const Keyframe& keyframe) const {
   return camera(keyframe.observations->camera);
 }

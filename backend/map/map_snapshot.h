@@ -23,6 +23,9 @@ class MapSnapshot {
   const Camera& camera(CameraId id) const;
   const Camera& camera(const Keyframe& keyframe) const;
 
+  // What was found out about it; nothing of most cameras.
+  RigCorrection correction(CameraId id) const;
+
   std::size_t camera_count() const;
   std::size_t keyframe_count() const;
   std::size_t landmark_count() const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "backend/map/keyframe_covariances.h"
 #include "backend/map/landmark.h"
 #include "backend/map/persistent_table.h"
+#include "backend/map/rig_correction.h"
 #include "cameras/camera.h"
 
 namespace hybrid_slam {
@@ -29,13 +31,14 @@ struct MapTables {
   KeyframeId origin;
   std::uint32_t next_keyframe = 0;
   std::uint32_t next_landmark = 0;
-  std::vector<std::int64_t> newest_frame_index;  // per camera, of any keyframe ever added; or -1
+  std::vector<std::int64_t> newest_frame_index;   // per camera, of any keyframe ever added; or -1
+  std::map<CameraId, RigCorrection> corrections;  // of stereo cameras of which something is known
   std::shared_ptr<const KeyframeCovariances> covariances;  // null where nobody told; not saved
 
   // A complete copy that costs next to nothing; see PersistentTable::share().
   MapTables share() {
     return {cameras,       keyframes.share(), landmarks.share(),  erased.share(), origin,
-            next_keyframe, next_landmark,     newest_frame_index, covariances};
+            next_keyframe, next_landmark,     newest_frame_index, corrections,    covariances};
   }
 };
 

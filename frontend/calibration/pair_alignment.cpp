@@ -39,8 +39,9 @@ double median(std::vector<double> values) {
 
 struct RowFit {
   Parameters parameters = Parameters::Zero();
-  double squares = 0;   // of the residuals
-  double modelled = 0;  // squares of the rows by the parameters
+  Parameters cofactors = Parameters::Zero();  // variances of the parameters over a match's [1/px^2]
+  double squares = 0;                         // of the residuals
+  double modelled = 0;                        // squares of the rows by the parameters
   int matches = 0;
 };
 
@@ -59,7 +60,9 @@ RowFit fit_rows(const Calibrated<RectifiedStereo>& camera, const std::vector<Pai
     rows += double{match.rows} * match.rows;
     ++fit.matches;
   }
-  fit.parameters = normal.ldlt().solve(right);
+  const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
+  fit.parameters = solver.solve(right);
+  fit.cofactors = solver.solve(Eigen::Matrix3d::Identity()).diagonal().cwiseMax(0);
   fit.modelled = fit.parameters.dot(normal * fit.parameters);
   fit.squares = std::max(0.0, rows - fit.modelled);
   return fit;
@@ -67,9 +70,21 @@ RowFit fit_rows(const Calibrated<RectifiedStereo>& camera, const std::vector<Pai
 
 }  // namespace
 
-bool PairAlignment::is_shown() const {
-  return matches > 0 && row_rms > std::max(row_sigma, kHarmlessRows) &&
-         matches * row_rms * row_rms > kAccidentalChi2 * row_sigma * row_sigma;
+bool is_shown(const PairAlignment& alignment) {
+  const double sigma = alignment.row_sigma;
+  const double squares = alignment.row_rms * alignment.row_rms;
+  return alignment.matches > 0 && alignment.row_rms > std::max(sigma, kHarmlessRows) &&
+         alignment.matches * squares > kAccidentalChi2 * sigma * sigma;
+}
+
+std::vector<PairMatch> aligned(const Calibrated<RectifiedStereo>& camera,
+                               const PairAlignment& alignment, std::span<const PairMatch> matches) {
+  const Parameters parameters(alignment.pitch, alignment.roll, alignment.focal_ratio);
+  std::vector<PairMatch> result(matches.begin(), matches.end());
+  for (PairMatch& match : result) {
+    match.rows -= static_cast<float>(row_derivative(camera, match).dot(parameters));
+  }
+  return result;
 }
 
 std::optional<PairAlignment> find_pair_alignment(const Calibrated<RectifiedStereo>& camera,
@@ -95,12 +110,17 @@ std::optional<PairAlignment> find_pair_alignment(const Calibrated<RectifiedStere
     if (fit.matches < kFewest || !fit.parameters.allFinite()) return std::nullopt;
     if (fit.matches == before) break;
   }
+  const double sigma = std::sqrt(fit.squares / (fit.matches - 3));
+  const Parameters sigmas = sigma * fit.cofactors.cwiseSqrt();
   return PairAlignment{fit.parameters[0],
                        fit.parameters[1],
                        fit.parameters[2],
                        fit.matches,
                        std::sqrt(fit.modelled / fit.matches),
-                       std::sqrt(fit.squares / (fit.matches - 3))};
+                       sigma,
+                       sigmas[0],
+                       sigmas[1],
+                       sigmas[2]};
 }
 
 RightAligner::RightAligner(const Calibrated<RectifiedStereo>& camera,

@@ -20,6 +20,12 @@ struct RigFindings {
   double disparity_offset = 0;             // in use [px]; 0: none is shown
   double disparity_sigma = 0;              // of what is known of it
   double median_disparity = 0;             // of the last frame [px]
+  std::optional<FoundParameter> disparity, shading;  // all that is known; none: nothing yet
+  RigCorrection of_map;                              // with which the run began
+  // Where what this run shows contradicts that: the rig is another one now.
+  struct {
+    bool rows = false, disparity = false, shading = false;
+  } changed;
 };
 
 // Follows the residuals of a run and says what lies under the noise of the keypoints; see

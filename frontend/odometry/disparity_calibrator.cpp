@@ -185,10 +185,12 @@ std::string DisparityCalibratorOptions::validate() const {
 }
 
 DisparityCalibrator::DisparityCalibrator(const Calibrated<RectifiedStereo>& camera,
-                                         const DisparityCalibratorOptions& options)
+                                         const DisparityCalibratorOptions& options,
+                                         const std::optional<FoundParameter>& start)
     : camera_(camera),
       options_(options),
-      estimate_(options.prior_sigma, kShareOfPair, options.min_significance) {
+      estimate_(options.prior_sigma, kShareOfPair, options.min_significance,
+                options.enabled ? start : std::nullopt) {
   const std::string error = options.validate();
   if (!error.empty()) throw std::invalid_argument("disparity calibrator: " + error);
 }

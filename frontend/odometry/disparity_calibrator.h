@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "cameras/camera.h"
@@ -32,8 +33,10 @@ struct DisparityCalibratorOptions {
 // not average that out; it is part of sigma().
 class DisparityCalibrator {
  public:
+  // `start`: what an earlier run has found of the camera; unused where the calibrator is disabled.
   DisparityCalibrator(const Calibrated<RectifiedStereo>& camera,
-                      const DisparityCalibratorOptions& options);
+                      const DisparityCalibratorOptions& options,
+                      const std::optional<FoundParameter>& start = std::nullopt);
 
   // The inliers of a motion. `*_correction` [px]: what was already subtracted from u_right.
   void add(const StereoFeatures& previous, double previous_correction,
@@ -42,6 +45,8 @@ class DisparityCalibrator {
   // [px]; 0 as long as it is not significant. Changes at stated numbers of pairs alone.
   double offset() const { return estimate_.in_use(); }
   double sigma() const { return estimate_.sigma(); }  // standard deviation of the estimate [px]
+
+  const RunningEstimate& estimate() const { return estimate_; }
 
  private:
   Calibrated<RectifiedStereo> camera_;

@@ -45,12 +45,13 @@ std::vector<LandmarkId> valid_ids(const std::vector<LandmarkId>& ids);
 // pose and landmarks and leaves better ones there.
 class MapMatcher {
  public:
-  // `places` may be null; who owns it lets it follow the map.
+  // `places` may be null; who owns it lets it follow the map. `shading`: see TrackRefiner.
   MapMatcher(CameraId camera_id, const Camera& camera, const TrackerOptions& options,
-             std::shared_ptr<const KeyframeDatabase> places)
+             std::shared_ptr<const KeyframeDatabase> places,
+             const std::optional<FoundParameter>& shading = std::nullopt)
       : camera_(camera),
         options_(options),
-        refiner_(camera_id, camera, options.refinement),
+        refiner_(camera_id, camera, options.refinement, shading),
         places_(std::move(places)) {}
 
   FeatureView view_of(const Frame& frame) const;
@@ -122,6 +123,7 @@ class MapMatcher {
 
   // See TrackRefiner.
   double shading() const { return refiner_.shading(); }
+  const RunningEstimate& shading_estimate() const { return refiner_.shading_estimate(); }
   ShadingDoubt shading_doubt() const { return refiner_.shading_doubt(); }
 
  private:

@@ -118,8 +118,11 @@ ShadedTrack make_shaded_track(const Calibrated<RectifiedStereo>& camera,
           .sigma = double{now.sigma}};
 }
 
-ShadingCalibrator::ShadingCalibrator(const ShadingCalibratorOptions& options)
-    : options_(options), estimate_(options.prior_sigma, kShareOfTrack, options.min_significance) {
+ShadingCalibrator::ShadingCalibrator(const ShadingCalibratorOptions& options,
+                                     const std::optional<FoundParameter>& start)
+    : options_(options),
+      estimate_(options.prior_sigma, kShareOfTrack, options.min_significance,
+                options.enabled ? start : std::nullopt) {
   const std::string error = options.validate();
   if (!error.empty()) throw std::invalid_argument(error);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -57,7 +58,9 @@ struct ShadingDoubt {
 // which is H = 0.5 to 0.75; rendered ground lies at the upper end.
 class ShadingCalibrator {
  public:
-  explicit ShadingCalibrator(const ShadingCalibratorOptions& options);
+  // `start`: what an earlier run has found of the lamps; unused where the calibrator is disabled.
+  explicit ShadingCalibrator(const ShadingCalibratorOptions& options,
+                             const std::optional<FoundParameter>& start = std::nullopt);
 
   // The tracks that end in one keyframe. `corrected`: the depth per size by which their positions
   // there were corrected.
@@ -67,6 +70,8 @@ class ShadingCalibrator {
   // Changes at stated numbers of keyframes alone.
   double depth_per_size() const { return estimate_.in_use(); }
   double sigma() const { return estimate_.sigma(); }  // standard deviation of the estimate
+
+  const RunningEstimate& estimate() const { return estimate_; }
 
   // Of a pose that rests on features of about this size [rad]; none where lamps stand still.
   ShadingDoubt doubt(double size) const;

@@ -76,13 +76,14 @@ std::string StereoTrackerOptions::validate() const {
 
 StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStereo>& camera,
                              const StereoTrackerOptions& options,
-                             std::shared_ptr<const KeyframeDatabase> places)
+                             std::shared_ptr<const KeyframeDatabase> places,
+                             const RigCorrection& known)
     : camera_id_(camera_id),
       camera_(camera),
       options_(options),
       ladder_(camera, options.odometer),
-      disparity_(camera, options.disparity),
-      matcher_(camera_id, camera, options, std::move(places)),
+      disparity_(camera, options.disparity, known.disparity),
+      matcher_(camera_id, camera, options, std::move(places), known.shading),
       moving_(camera.width, camera.height),
       last_(camera_id) {
   const std::string error = options.validate();

@@ -50,11 +50,13 @@ struct StereoTrackerOptions : TrackerOptions {
 // nothing but itself: the next one is compared with the last good one (docs/tracking.md).
 class StereoTracker {
  public:
-  // `places`: where to look for lost frames (MapMatcher). Throws std::invalid_argument if the
-  // options are not valid.
+  // `places`: where to look for lost frames (MapMatcher). `known`: of the camera, by an earlier
+  // run: offset and shading begin with it. Throws std::invalid_argument if the options are not
+  // valid.
   StereoTracker(CameraId camera_id, const Calibrated<RectifiedStereo>& camera,
                 const StereoTrackerOptions& options,
-                std::shared_ptr<const KeyframeDatabase> places = nullptr);
+                std::shared_ptr<const KeyframeDatabase> places = nullptr,
+                const RigCorrection& known = {});
 
   // `allow_keyframe`: false while mapping has more waiting than it can take.
   TrackedFrame track(Frame frame, const MapSnapshot& map, bool allow_keyframe = true);
@@ -69,6 +71,7 @@ class StereoTracker {
   }
 
   const DisparityCalibrator& disparity() const { return disparity_; }
+  const RunningEstimate& shading_estimate() const { return matcher_.shading_estimate(); }
 
   // See TrackRefiner.
   ShadingDoubt shading_doubt() const { return matcher_.shading_doubt(); }

@@ -77,8 +77,12 @@ std::string TrackRefinementOptions::validate() const {
 }
 
 TrackRefiner::TrackRefiner(CameraId camera_id, const Camera& camera,
-                           const TrackRefinementOptions& options)
-    : camera_id_(camera_id), camera_(camera), options_(options), shading_(options.shading) {
+                           const TrackRefinementOptions& options,
+                           const std::optional<FoundParameter>& shading)
+    : camera_id_(camera_id),
+      camera_(camera),
+      options_(options),
+      shading_(options.shading, shading) {
   if (const auto* stereo = std::get_if<Calibrated<RectifiedStereo>>(&camera)) {
     focal_ = stereo->params[0];
   }

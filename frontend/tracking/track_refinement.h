@@ -40,7 +40,9 @@ struct TrackRefinementOptions {
 // as far as it is known (see ShadingCalibrator).
 class TrackRefiner {
  public:
-  TrackRefiner(CameraId camera_id, const Camera& camera, const TrackRefinementOptions& options);
+  // `shading`: what an earlier run has found of it; see ShadingCalibrator.
+  TrackRefiner(CameraId camera_id, const Camera& camera, const TrackRefinementOptions& options,
+               const std::optional<FoundParameter>& shading = std::nullopt);
 
   // The frame becomes a keyframe: its image can serve as reference.
   void remember(const Frame& frame);
@@ -61,6 +63,7 @@ class TrackRefiner {
 
   // In use now; see ShadingCalibrator.
   double shading() const { return shading_.depth_per_size(); }
+  const RunningEstimate& shading_estimate() const { return shading_.estimate(); }
 
   // What it leaves open for the last tracked frame; nothing of one without aligned keypoints.
   ShadingDoubt shading_doubt() const { return shading_.doubt(size_); }

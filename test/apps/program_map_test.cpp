@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include <catch2/catch.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "apps/io/trajectory.h"
 #include "backend/map/map_file.h"
@@ -54,6 +55,49 @@ TEST_CASE("hybrid_slam goes on with a saved map") {
     CHECK((first[i].world_from_cam.translation() - second[i].world_from_cam.translation()).norm() <
           0.005);
   }
+}
+
+// The right images stand `rows` px higher: a camera that is turned about its horizontal axis.
+void raise_right_images(const fs::path& data, int rows) {
+  for (int frame = 0; frame < kSurveyFrames; ++frame) {
+    const std::string path = kitti_image(data, true, frame).string();
+    const cv::Mat image = cv::imread(path, cv::IMREAD_GRAYSCALE);
+    cv::Mat raised = image.clone();
+    image.rowRange(rows, image.rows).copyTo(raised.rowRange(0, image.rows - rows));
+    REQUIRE(cv::imwrite(path, raised));
+  }
+}
+
+TEST_CASE("the pair of the first run is where the second one begins") {
+  const TempFolder folder;
+  write_kitti_survey(folder.path() / "right");
+  write_kitti_survey(folder.path() / "wrong");
+  raise_right_images(folder.path() / "wrong", 2);
+  const auto calibration = [&](const std::string& data, const std::vector<std::string>& more) {
+    const Outcome outcome = run_slam(folder.path(), data, more);
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    auto found = read_json(folder.path() / more.back() / "summary.json")["calibration"];
+    CHECK(count_lines(outcome.err, "not as the map says") ==
+          static_cast<int>(found["changes"].size()));
+    return found;
+  };
+  const auto first = calibration("wrong", {"--out", "first"});
+  REQUIRE(first["taken_out"].is_object());
+  // By other pairs it would be found a little otherwise.
+  const auto second =
+      calibration("wrong", {"--map", "first/map.hslam", "--start", "4", "--out", "second"});
+  CHECK(second["taken_out"] == first["taken_out"]);
+  CHECK(second["changes"].empty());
+  const auto alone = calibration("wrong", {"--start", "4", "--out", "alone"});
+  CHECK(alone["taken_out"] != first["taken_out"]);
+  const auto repaired = calibration("right", {"--map", "first/map.hslam", "--out", "repaired"});
+  CHECK(repaired["taken_out"].is_null());
+  REQUIRE(repaired["changes"].size() == 1);
+  CHECK_THAT(repaired["changes"][0].get<std::string>(),
+             Catch::StartsWith("rows are off by nothing"));
+  const auto map = load_map(folder.path() / "repaired/map.hslam").map;
+  CHECK_FALSE(map.view().correction(CameraId(0)).rows);
 }
 
 TEST_CASE("hybrid_slam finds itself in a map and leaves it alone") {

@@ -61,6 +61,28 @@ TEST_CASE("another offset of the disparities holds for the whole map") {
   CHECK(path_length(filled.map.view()) == Approx(length).epsilon(1e-3));
 }
 
+TEST_CASE("keyframes of a pair as it was before keep their disparities") {
+  FilledMap filled = orbit();
+  const KeyframeId first = filled.keyframes[8];
+  const auto right_of = [&](KeyframeId id) {
+    return filled.map.view().at(id).observations->u_right;
+  };
+  const auto old = right_of(filled.keyframes[7]);
+  const auto own = right_of(first);
+  const double length = path_length(filled.map.view());
+  CHECK(shift_disparities(filled.map, CameraId(0), kOffset, first) == 1);
+  const auto same = right_of(filled.keyframes[7]);
+  const auto shifted = right_of(first);
+  for (std::size_t i = 0; i < old.size(); ++i) {
+    CHECK((same[i] == old[i] || std::isnan(old[i])));
+  }
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (!std::isnan(own[i])) CHECK(shifted[i] == Approx(own[i] - kOffset).epsilon(1e-5));
+  }
+  CHECK(path_length(filled.map.view()) == length);
+  CHECK(filled.map.check_consistency() == std::vector<std::string>{});
+}
+
 TEST_CASE("a map that was made with a wrong offset becomes right once it is known") {
   FilledMap filled = orbit();
   const double length = path_length(filled.map.view());

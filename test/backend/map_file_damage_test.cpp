@@ -28,6 +28,10 @@ class SavedMap {
     MapEdit edit;
     edit.erased_keyframes = {filled.keyframes[4], filled.keyframes[5]};
     filled.map.apply(edit);
+    RigCorrection found;
+    found.rows = PairAlignment{3e-3, -2e-3, 5e-3, 412, 1.6, 0.3, 1e-5, 2e-5, 3e-5};
+    found.disparity = FoundParameter{1.25, 0.02, 0.2, 1.2};
+    filled.map.set_correction(CameraId(0), found);
     save_map(path(), filled.map.view(), {"program", "options"});
     bytes_ = read_text(path());
     SectionFileReader reader(path(), kMapFileFormat);
@@ -147,12 +151,12 @@ TEST_CASE("a damaged file is refused with its name, the place and the reason") {
     refused_as("no map file");
   }
   SECTION("of a later version") {
-    bytes[8] = 5;
-    refused_as("version 5 of the format, where this program knows 2 to 4");
+    bytes[8] = 6;
+    refused_as("version 6 of the format, where this program knows 2 to 5");
   }
   SECTION("of an earlier version") {
     bytes[8] = 1;
-    refused_as("version 1 of the format, where this program knows 2 to 4");
+    refused_as("version 1 of the format, where this program knows 2 to 5");
   }
   SECTION("a byte changed") {
     bytes[bytes.size() / 2] ^= 4;
@@ -207,7 +211,7 @@ TEST_CASE("sections that are missing, doubled or out of order are refused") {
     CHECK_FALSE(refusal(saved.path()).empty());
   };
   const SavedMap::Sections& all = saved.sections();
-  REQUIRE(all.size() == 7);
+  REQUIRE(all.size() == 8);
   for (std::size_t i = 0; i < all.size(); ++i) {
     INFO("section " << all[i].first);
     auto sections = all;
@@ -237,6 +241,7 @@ TEST_CASE("a value out of range is refused with the section and the reason") {
   std::string& landmarks = saved.content(sections, kLandmarksSection);
   std::string& state = saved.content(sections, kStateSection);
   std::string& odometry = saved.content(sections, kOdometrySection);
+  std::string& corrections = saved.content(sections, kCorrectionsSection);
   // Places in the first keyframe: id 0, parent 4, keep 8, pose 9, camera 65, frame 69, time 77,
   // kind 85, right 86, count 87, keypoints from 91.
   SECTION("pose") {
@@ -302,6 +307,20 @@ TEST_CASE("a value out of range is refused with the section and the reason") {
   SECTION("keypoint of odometry") {
     put(odometry, 236, std::uint32_t{100000});
     refused_as(kOdometrySection, "odometry without a covariance, or by keypoints");
+  }
+  // Of camera 0: id 0, rows 4, pitch 5, roll 13, focal ratio 21, three sigmas from 29, matches 53,
+  // rms 57, sigma 65; offset 73, its value 74, sigma 82, systematic 90, in use 98; shading 106.
+  SECTION("correction of a fisheye") {
+    put(corrections, 0, std::uint32_t{1});
+    refused_as(kCorrectionsSection, "correction of a camera that is no stereo pair");
+  }
+  SECTION("camera that is turned away") {
+    put(corrections, 5, 1.0);
+    refused_as(kCorrectionsSection, "pair that cannot be aligned");
+  }
+  SECTION("parameter without a sigma") {
+    put(corrections, 82, 0.0);
+    refused_as(kCorrectionsSection, "parameter without a standard deviation");
   }
   SECTION("id") {
     put(landmarks, 0, std::uint32_t{1} << 30);

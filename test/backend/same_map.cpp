@@ -60,6 +60,7 @@ void check_same_map(const MapSnapshot& a, const MapSnapshot& b) {
   REQUIRE(a.camera_count() == b.camera_count());
   for (std::uint32_t i = 0; i < a.camera_count(); ++i) {
     CHECK(same_camera(a.camera(CameraId(i)), b.camera(CameraId(i))));
+    CHECK(a.correction(CameraId(i)) == b.correction(CameraId(i)));
     CHECK(a.newest_frame_index(CameraId(i)) == b.newest_frame_index(CameraId(i)));
   }
   CHECK(a.origin() == b.origin());

@@ -1,8 +1,13 @@
 // Places found again: after the camera was blind, and in maps of runs before.
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <memory>
+#include <numeric>
 #include <set>
+#include <utility>
 
+#include "frontend/calibration/rig_calibrator.h"
 #include "test/integration/simulated_runs.h"
 #include "test/support/random.h"
 
@@ -149,6 +154,83 @@ TEST_CASE("Localising tracks every frame and leaves the map as it was", "[integr
       CHECK(record.frame.frame_index > a.map->newest_frame_index(CameraId(0)));
     }
   }
+}
+
+// A corridor, seen by a pair whose disparities are `offset` [px] too small: of even and odd
+// moments.
+SimulatedSource corridor(std::size_t start, float offset) {
+  SyntheticSceneOptions options;
+  options.trajectory = SceneTrajectory::kCorridor;
+  options.times = 60;
+  options.step = 0.2;
+  options.noise = 0.05;
+  SyntheticScene scene = make_synthetic_scene(options);
+  for (SyntheticFrame& frame : scene.frames) {
+    auto seen = std::make_shared<FrameObservations>(*frame.observations);
+    for (float& u_right : seen->u_right) u_right += offset;
+    frame.observations = std::move(seen);
+  }
+  SimulatedSource source(std::move(scene));
+  for (std::size_t i = start; i < 60; i += 2) source.order.push_back(i);
+  return source;
+}
+
+RunResult run_with(const SimulatedSource& source, bool localize, Map map = {}) {
+  ReplayOptions run = simulated_run(source);
+  run.session.localize = localize;
+  return run_every_frame(source, simulated_options(), run, {}, std::move(map));
+}
+
+TEST_CASE("A second run begins with what the first has found of its rig", "[integration]") {
+  constexpr float kOffset = 0.5F;  // some 3 % of the scale
+  const RunResult a = run_with(corridor(0, kOffset), false);
+  CHECK(a.records.front().frame.disparity_offset == 0);
+  const auto found = a.map->correction(CameraId(0)).disparity;
+  REQUIRE(found);
+  CHECK(found->in_use == Approx(kOffset).margin(0.03));
+  CHECK(std::abs(found->value - kOffset) < 4 * std::hypot(found->sigma, found->systematic));
+  for (const bool localize : {false, true}) {
+    CAPTURE(localize);
+    const RunResult b = run_with(corridor(1, kOffset), localize, copy_of(*a.map));
+    CHECK(b.records.front().frame.disparity_offset == found->in_use);
+    CHECK(b.disparity_offset == Approx(kOffset).margin(0.03));
+    CHECK(b.rig->of_map.disparity == found);
+    CHECK_FALSE(b.rig->changed.disparity);
+    CHECK(b.frames.tracked == 30);
+    CHECK(faults_of(*b.map) == "");
+    const auto later = b.map->correction(CameraId(0)).disparity;
+    REQUIRE(later);
+    if (localize) CHECK(*later == *found);
+    if (!localize) CHECK(later->sigma < found->sigma);
+  }
+}
+
+// Median disparity of the camera's keyframes before and from `first` on.
+std::pair<double, double> disparities(const MapSnapshot& map, KeyframeId first) {
+  std::vector<double> before, after;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const FrameObservations& seen = *map.at(id).observations;
+    (id < first ? before : after).push_back(median_disparity(seen.features, seen.u_right));
+  }
+  const auto mean = [](const std::vector<double>& all) {
+    return std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size());
+  };
+  return {mean(before), mean(after)};
+}
+
+TEST_CASE("A rig that was repaired between two runs is not as the map says", "[integration]") {
+  const RunResult a = run_with(corridor(0, 0.5F), false);
+  const RunResult b = run_with(corridor(1, 0), false, copy_of(*a.map));
+  CHECK(b.rig->changed.disparity);
+  CHECK(std::abs(b.disparity_offset) < 0.03);
+  const auto found = b.map->correction(CameraId(0)).disparity;
+  REQUIRE(found);
+  CHECK(std::abs(found->value) < 0.03);
+  CHECK(faults_of(*b.map) == "");
+  // The first run's keyframes keep what was right for them.
+  const KeyframeId first = a.map->next_keyframe_id();
+  CHECK(disparities(*b.map, first).first == Approx(disparities(*a.map, first).first).margin(0.05));
+  CHECK(max_position_error(b, corridor(1, 0)) < 0.1);
 }
 
 TEST_CASE("A run with another camera adds it to the map", "[integration]") {

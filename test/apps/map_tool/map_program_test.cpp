@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "backend/map/map_assembly.h"
 #include "backend/map/map_file.h"
 #include "backend/map/section_file.h"
 #include "test/apps/map_tool/tool_maps.h"
@@ -29,7 +30,44 @@ struct Bench {
   }
 };
 
+// What was found out about the pair of a dive.
+RigCorrection found_rig(double offset) {
+  RigCorrection found;
+  found.rows = PairAlignment{3e-3, -2e-3, 5e-3, 412, 1.6, 0.3, 1e-5, 2e-5, 3e-5};
+  found.disparity = FoundParameter{offset, 0.03, 0.04, offset};
+  return found;
+}
+
 }  // namespace
+
+TEST_CASE("map_tool: what was found out about the cameras is told and kept") {
+  const Bench bench;
+  const auto path = [&](const char* name) { return bench.folder.path() / name; };
+  // Two dives, of which the first file holds the later one.
+  FilledMap later = map_of_frames(make_synthetic_scene(small_orbit(12, true)), 12, 24, 1);
+  FilledMap earlier = map_of_frames(make_synthetic_scene(small_orbit(12, true)), 0, 12, 1);
+  later.map.set_correction(CameraId(0), found_rig(1.25));
+  earlier.map.set_correction(CameraId(0), found_rig(-0.5));
+  save_map(path("later.hslam"), later.map.view(), {"a program", ""});
+  save_map(path("earlier.hslam"), earlier.map.view(), {"a program", ""});
+
+  const Outcome info = bench.run({"info", "later.hslam", "--json", "info.json"});
+  CHECK_THAT(info.out, Catch::Contains("right camera turned by 0.172 +- 0.001 deg about x"));
+  CHECK_THAT(info.out, Catch::Contains("disparities [px] 1.250 +- 0.050, 1.250 in use"));
+  const auto json = nlohmann::json::parse(read_text(path("info.json")))["cameras"];
+  CHECK(json[0]["found"]["disparity_offset_px"]["value"] == 1.25);
+  CHECK(json[0]["found"]["rows"]["matches"] == 412);
+  CHECK(json[0]["found"]["shading_depth"].is_null());
+  CHECK(json[1]["found"]["rows"].is_null());
+
+  CHECK(bench.run({"crop", "later.hslam", "--from", "0.7", "--out", "part.hslam"}).code == 0);
+  CHECK(load_map(path("part.hslam")).map.view().correction(CameraId(0)) == found_rig(1.25));
+  const std::vector<MapPart> parts{{&later.map.view(), later.map.view().keyframe_ids(), {}},
+                                   {&earlier.map.view(), earlier.map.view().keyframe_ids(), {}}};
+  CHECK(assemble_map(parts).view().correction(CameraId(0)) == found_rig(1.25));
+  const Outcome out = bench.run({"export", "later.hslam", "--format", "tum", "--out", "poses"});
+  CHECK_THAT(out.out, Catch::Contains("camera 0, not in the export: offset of the disparities"));
+}
 
 TEST_CASE("map_tool: info, verify, crop, export in turn") {
   const Bench bench;

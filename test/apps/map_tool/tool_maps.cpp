@@ -49,6 +49,7 @@ MapTables tables_of(Map& map) {
   tables.next_keyframe = from.next_keyframe;
   tables.next_landmark = from.next_landmark;
   tables.newest_frame_index = from.newest_frame_index;
+  tables.corrections = from.corrections;
   return tables;
 }
 
