@@ -37,7 +37,7 @@ class EveryFrameCore final : public SlamCore {
   }
 
   void finish(bool) override {
-    mapping_.conclude(tracking_.take_counts());
+    mapping_.conclude(tracking_.end());
     publish();
   }
 

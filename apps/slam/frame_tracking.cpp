@@ -76,17 +76,18 @@ FrameTracking::FrameTracking(const CameraRig& cameras, const SlamOptions& option
                              const Vocabulary& vocabulary, bool localize, LocalMapping& mapping,
                              Observers& observers, StageTimes& times)
     : places_(std::make_shared<KeyframeDatabase>(vocabulary)),
-      stereo_(mapping.camera_id(cameras.stereo), cameras.stereo, stereo_options(cameras, options),
-              places_, mapping.map().view().correction(mapping.camera_id(cameras.stereo))),
+      stereo_id_(mapping.camera_id(cameras.stereo)),
+      stereo_(stereo_id_, cameras.stereo, stereo_options(cameras, options), places_,
+              mapping.map().view().correction(stereo_id_)),
       observers_(observers),
       times_(times),
       localize_(localize),
       first_index_(next_frame_index(mapping.map().view())),
       diagnosis_(options.features, cameras.fisheye.has_value()),
-      stereo_floor_(mapping.camera_id(cameras.stereo)),
+      stereo_floor_(stereo_id_),
       lamps_(cameras.fisheye.has_value()) {
   rig_.rows = RowField(cameras.stereo.width, cameras.stereo.height);
-  rig_.of_map = mapping.map().view().correction(mapping.camera_id(cameras.stereo));
+  rig_.of_map = mapping.map().view().correction(stereo_id_);
   rig_.alignment = rig_.of_map.rows;
   if (localize_ && !mapping.map().view().origin().valid()) {
     throw std::logic_error("FrameTracking: nothing to localise in");
@@ -144,8 +145,7 @@ std::optional<MappingJob> FrameTracking::track(CameraFrame frame, const MapSnaps
                     reference.valid() ? map.cam_from_world(reference) : Rigid3d(),
                     counts_.take(),
                     offset,
-                    correction(),
-                    stereo_.disparity().estimate().contradicts_start()};
+                    correction()};
 }
 
 // What the pair itself shows, before anything is corrected by the map.
@@ -181,6 +181,12 @@ std::shared_ptr<const RigFindings> FrameTracking::findings(const TrackedFrame& t
   rig_.changed.disparity = stereo_.disparity().estimate().contradicts_start();
   rig_.changed.shading = stereo_.shading_estimate().contradicts_start();
   return std::make_shared<const RigFindings>(rig_);
+}
+
+TrackingEnd FrameTracking::end() {
+  TrackingEnd end{counts_.take(), stereo_id_, std::nullopt, rig_.disparity_offset};
+  if (!localize_) end.correction = correction();
+  return end;
 }
 
 // Of a calibrator that is turned off, what the map says stays.

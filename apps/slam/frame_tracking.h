@@ -28,8 +28,8 @@ class FrameTracking {
   std::optional<MappingJob> track(CameraFrame frame, const MapSnapshot& map,
                                   bool allow_keyframe = true);
 
-  // What was counted since the last frame that became a keyframe; begins anew.
-  std::vector<LandmarkCount> take_counts() { return counts_.take(); }
+  // After the last frame.
+  TrackingEnd end();
 
   // The words of the map's keyframes, which follow it: for use in the same thread. Who has found
   // them already assigns them before track(), which else does it.
@@ -45,6 +45,7 @@ class FrameTracking {
   TrackedFrame track_by_camera(CameraFrame& frame, const MapSnapshot& map, bool allow_keyframe);
 
   std::shared_ptr<KeyframeDatabase> places_;
+  CameraId stereo_id_;
   StereoTracker stereo_;
   std::optional<FisheyeTracker> fisheye_;
   Observers& observers_;

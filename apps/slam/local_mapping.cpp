@@ -66,9 +66,8 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   counts.counted = job.counts;
   backend_.apply(counts);
   if (job.camera == CameraKind::kStereo) {
-    begin_with_offset(job);
-    take_offset_out(job);
-    backend_.set_correction(job.keyframe.observations->camera, job.correction);
+    const FrameObservations& seen = *job.keyframe.observations;
+    take_in(seen.camera, job.correction, seen, job.disparity_offset);
   }
   const KeyframeId id = backend_.add(carried_along(job, backend_.view()));
   backend_.apply(probation_.cull(backend_.view(), id));
@@ -88,30 +87,24 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   return id;
 }
 
-// Of a map that does not say what was taken out of its keyframes, and of one that was made by a
-// pair that stood otherwise, these stay as they are.
-void LocalMapping::begin_with_offset(const MappingJob& job) {
+// What was found out about the pair meanwhile holds for all keyframes of this run, not for the new
+// ones alone. Of a rig that is hardly off, it is left to those to come: less than the map may be
+// off by anyway is not worth moving all of it. Keyframes of runs before keep what these have found:
+// it is the better, or the pair stood otherwise. `seen`: by the pair, lately.
+void LocalMapping::take_in(CameraId stereo, const RigCorrection& correction,
+                           const FrameObservations& seen, double offset) {
   if (!disparity_offset_) {
-    const auto known = backend_.view().correction(job.keyframe.observations->camera).disparity;
+    const auto known = backend_.view().correction(stereo).disparity;
     disparity_offset_ = known ? known->in_use : 0;
-    first_with_offset_ = known ? KeyframeId(0) : first_own_;
   }
-  if (job.offset_changed) first_with_offset_ = first_own_;
-}
-
-// What was found out about the pair meanwhile holds for all its keyframes, not for the new ones
-// alone. Of a rig that is hardly off, it is left to those to come: less than the map may be off by
-// anyway is not worth moving all of it.
-void LocalMapping::take_offset_out(const MappingJob& job) {
-  const double before = disparity_offset_.value();
-  const double by = job.disparity_offset - before;
-  const double most = std::max(std::abs(job.disparity_offset), std::abs(before));
-  const FrameObservations& seen = *job.keyframe.observations;
+  backend_.set_correction(stereo, correction);
+  const double by = offset - *disparity_offset_;
+  const double most = std::max(std::abs(offset), std::abs(*disparity_offset_));
   const double disparity = median_disparity(seen.features, seen.u_right);
   if (by == 0 || !(disparity > 0) || most < kDoubtfulScale * disparity) return;
-  backend_.shift_disparities(seen.camera, by, first_with_offset_);
+  backend_.shift_disparities(stereo, by, first_own_);
   if (options_.backend.full.enabled) backend_.optimize_full();
-  disparity_offset_ = job.disparity_offset;
+  disparity_offset_ = offset;
 }
 
 LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
@@ -144,11 +137,14 @@ void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& p
   take_in_full(std::move(result), backend_.closings(), times, publish);
 }
 
-void LocalMapping::conclude(const std::vector<LandmarkCount>& counts) {
+void LocalMapping::conclude(const TrackingEnd& end) {
   MapEdit counted;
-  counted.counted = counts;
+  counted.counted = end.counts;
   backend_.apply(counted);
   backend_.apply(probation_.conclude(backend_.view()));
+  const Keyframe* newest = backend_.view().newest_keyframe(end.stereo);
+  if (!end.correction || newest == nullptr) return;
+  take_in(end.stereo, *end.correction, *newest->observations, end.disparity_offset);
 }
 
 }  // namespace hybrid_slam

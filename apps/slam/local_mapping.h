@@ -25,9 +25,17 @@ struct MappingJob {
   std::vector<LandmarkCount> counts;
   double disparity_offset = 0;  // [px] that was taken out of a stereo keyframe's disparities
   RigCorrection correction{};   // what is known of the stereo pair by now
-  bool offset_changed = false;  // it is another one than the map says: see RunningEstimate
 
   std::int64_t frame_index() const { return keyframe.observations->frame_index; }
+};
+
+// What tracking knows when a run ends.
+struct TrackingEnd {
+  std::vector<LandmarkCount> counts;  // since the last keyframe
+  CameraId stereo;
+  // Of the stereo pair; none where the map is to stay as it is.
+  std::optional<RigCorrection> correction;
+  double disparity_offset = 0;  // [px] of the last stereo frame
 };
 
 // How often tracking saw each landmark since the last keyframe: no larger than the part of the map
@@ -73,25 +81,23 @@ class LocalMapping {
   // The same at once, if the options want it for a map of this size.
   void adjust_full(StageTimes& times, const std::function<void()>& publish);
 
-  // What tracking counted since the last keyframe; nothing comes after it. Landmarks too young to
-  // have been judged are judged by that: what moves by itself would stay in the map otherwise.
-  void conclude(const std::vector<LandmarkCount>& counts);
+  // Nothing comes after it. Landmarks too young to have been judged are judged by what was counted
+  // since the last keyframe: what moves by itself would stay in the map otherwise.
+  void conclude(const TrackingEnd& end);
 
   std::shared_ptr<const MapSnapshot> snapshot() { return backend_.snapshot(); }
   const Map& map() const { return backend_.map(); }
 
  private:
-  void begin_with_offset(const MappingJob& job);
-  void take_offset_out(const MappingJob& job);
+  void take_in(CameraId stereo, const RigCorrection& correction, const FrameObservations& seen,
+               double offset);
 
   SlamOptions options_;
   Backend backend_;
   LandmarkProbation probation_;
   KeyframeUse use_;
   KeyframeId first_own_;  // what is before it was in the map that this goes on with
-  // [px] that was taken out of all stereo keyframes from this one on.
-  std::optional<double> disparity_offset_;
-  KeyframeId first_with_offset_;
+  std::optional<double> disparity_offset_;  // [px] that was taken out of its own stereo keyframes
 };
 
 }  // namespace hybrid_slam

@@ -49,7 +49,7 @@ class RealtimeCore final : public SlamCore {
     join(cancelled);
     mapping_.rethrow();
     if (loops_) end_loops(cancelled);
-    local_mapping_.conclude(tracking_.take_counts());
+    local_mapping_.conclude(tracking_.end());
     mapping_.publish();
   }
 
