@@ -218,7 +218,7 @@ class PoseTree {
   std::vector<std::uint32_t> slot_of_;    // scratch, by pose: slot in the front at hand
   std::vector<std::uint32_t> looked_at_;  // scratch, by term: the last look for which it was
   std::uint32_t look_ = 0;
-  Eigen::MatrixXd wide_;                  // scratch: a factor that is kept in single precision
+  Eigen::MatrixXd wide_;  // scratch: a factor that is kept in single precision
   double last_cost_ = 0;
   std::size_t last_poses_ = 0;
   std::size_t last_undetermined_ = 0;
