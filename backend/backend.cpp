@@ -135,6 +135,10 @@ BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
   return summary;
 }
 
+void Backend::catch_up() {
+  if (smoother_) take_in(smoother_->rest(view()));
+}
+
 // The oldest.
 void Backend::forget_moves(std::size_t count) {
   moves_.erase(moves_.begin(), moves_.begin() + static_cast<std::ptrdiff_t>(count));
@@ -157,6 +161,7 @@ MapSmoother& Backend::smoother() {
 LoopOutcome Backend::close(const LoopMeasurement& loop) {
   LoopOutcome outcome;
   if (view().find(loop.keyframe) == nullptr || view().find(loop.match) == nullptr) return outcome;
+  catch_up();
   write_discrepancy(view(), loop, outcome);
   bring_together(loop);
   refused_.push_back(by_present_keypoints(view(), loop));  // until it is taken

@@ -77,6 +77,9 @@ class Backend {
   // when stopped.
   BundleSummary optimize_local(KeyframeId newest, std::stop_token stop = {});
 
+  // Takes in what optimize_local() found far from the newest keyframes and has left for later.
+  void catch_up();
+
   // Closes a loop. One between two components first brings the one without the origin, or the
   // smaller one, to where the loop sees it. Then the loop graph moves every keyframe, landmarks
   // follow, those of the two sides that are the same are merged. A loop that is not believed

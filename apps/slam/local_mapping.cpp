@@ -138,6 +138,7 @@ void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& p
 }
 
 void LocalMapping::conclude(const TrackingEnd& end) {
+  backend_.catch_up();
   MapEdit counted;
   counted.counted = end.counts;
   backend_.apply(counted);

@@ -17,34 +17,6 @@ namespace {
 // knows its own noise no better, from some tens of matches.
 constexpr double kShareTolerance = 0.1;
 
-// Of the tree that is handed out for covariances: 0.8 MB at most, and a frame that needs all of it
-// solves for six columns in half a millisecond. A map without loops needs a tenth of that.
-constexpr std::size_t kMaxCovarianceNumbers = 100000;
-
-// The newest keyframe of each camera, then those that share landmarks with them, most first.
-std::vector<KeyframeId> newest_and_neighbours(const MapSnapshot& map) {
-  std::vector<KeyframeId> found;
-  std::vector<char> has(map.camera_count(), 0);
-  for (std::uint32_t id = map.next_keyframe_id().value; id-- > 0;) {
-    const Keyframe* keyframe = map.find(KeyframeId(id));
-    if (keyframe == nullptr || has[keyframe->observations->camera.value]) continue;
-    has[keyframe->observations->camera.value] = 1;
-    found.push_back(keyframe->id);
-    if (found.size() == has.size()) break;
-  }
-  std::vector<Covisible> neighbours;
-  for (const KeyframeId id : found) {
-    const std::vector<Covisible>& those = map.at(id).covisible;
-    neighbours.insert(neighbours.end(), those.begin(), those.end());
-  }
-  std::stable_sort(neighbours.begin(), neighbours.end(),
-                   [](const Covisible& a, const Covisible& b) {
-                     return a.shared_landmarks > b.shared_landmarks;
-                   });
-  for (const Covisible& one : neighbours) found.push_back(one.id);
-  return found;
-}
-
 // One motion between the same keyframes, or none; whatever became of the keypoints.
 bool say_the_same(const Odometry* a, const Odometry* b) {
   if (a == nullptr || b == nullptr) return a == b;
@@ -67,6 +39,8 @@ MapSmoother::~MapSmoother() = default;
 BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
                                  const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
+  // A loop, or a map that is new to the smoother, is worth telling all of it at once.
+  const bool tell_all = known_map_ == nullptr || !new_loops_.empty();
   follow_moves(*map);
   take_in_keyframes(*map, newest);
   take_in_loops(*map);
@@ -79,7 +53,7 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
   forget_marginalized(*map, updated.marginalized);
   BundleResult result;
   set_outliers_aside(*map, newest, result);
-  write_estimate(*map, updated.moved, newest, result);
+  write_estimate(*map, updated.moved, newest, tell_all, result);
   let_keyframes_go(*map);
   known_map_ = std::move(map);
   BundleSummary& summary = result.summary;
@@ -91,23 +65,6 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
   summary.outliers = static_cast<int>(result.outliers.size());
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
-}
-
-std::shared_ptr<const KeyframeCovariances> MapSmoother::covariances(const MapSnapshot& map) const {
-  std::vector<std::uint32_t> poses;
-  for (const KeyframeId id : newest_and_neighbours(map)) {
-    if (id.value < pose_of_.size() && pose_of_[id.value] != kNone) {
-      poses.push_back(pose_of_[id.value]);
-    }
-  }
-  IncrementalSolver::PosePaths found = solver_->paths(poses, kMaxCovarianceNumbers);
-  std::vector<KeyframeCovariances::Known> known;
-  for (const auto& pose : found.poses) {
-    known.push_back({keyframe_of_[pose.pose], pose.at, pose.by_variable});
-  }
-  std::sort(known.begin(), known.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
-  return std::make_shared<const KeyframeCovariances>(map.origin(), std::move(found.paths),
-                                                     std::move(known));
 }
 
 // What it sees without the map knowing of it any more gets a keypoint that none has: the update
@@ -133,15 +90,12 @@ void MapSmoother::follow_moves(const MapSnapshot& map) {
   for (const KeyframeId id : map.changed_keyframes(*known_map_)) {
     const Keyframe* keyframe = map.find(id);
     if (keyframe == nullptr || id.value >= pose_of_.size() || id == map.origin()) continue;
-    const std::uint32_t pose = pose_of_[id.value];
-    if (is_off(*keyframe, solver_->pose(pose))) moved.emplace_back(pose, keyframe->cam_from_world);
+    if (stayed(*keyframe)) continue;  // the map has yet to follow the estimate
+    if (off_by(*keyframe) > options_.min_motion) {
+      moved.emplace_back(pose_of_[id.value], keyframe->cam_from_world);
+    }
   }
   if (!moved.empty()) solver_->move_poses(moved);
-}
-
-bool MapSmoother::is_off(const Keyframe& keyframe, const Rigid3d& estimate) const {
-  const auto off = (estimate.params - keyframe.cam_from_world.params).lpNorm<Eigen::Infinity>();
-  return off > options_.min_motion;
 }
 
 // All up to this one, in their order.
@@ -261,48 +215,6 @@ std::uint32_t MapSmoother::add_observation(const MapSnapshot& map, std::uint32_t
       frame.has_right(seen.keypoint) ? frame.u_right[seen.keypoint] : kNoRightMatch;
   return solver_->add_observation(
       {pose_of_[seen.keyframe.value], point, {keypoint.x, keypoint.y, u_right}, keypoint.sigma});
-}
-
-void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
-                                     BundleResult& result) {
-  const IncrementalOptions& options = options_.solver;
-  for (const LandmarkId id : map.at(newest).landmarks) {
-    const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
-    if (found == landmarks_.end()) continue;
-    std::erase_if(found->second.views, [&](const View& view) {
-      if (view.in_solver == kNone) return false;
-      const bool stereo = map.at(view.seen.keyframe).observations->has_right(view.seen.keypoint);
-      if (solver_->chi2(view.in_solver) <= (stereo ? options.chi2_stereo : options.chi2_mono)) {
-        return false;
-      }
-      solver_->remove_observation(view.in_solver);
-      result.outliers.push_back({id, view.seen});
-      return true;  // forgotten: where the map takes it in again, it is a new one
-    });
-  }
-}
-
-// The keyframes that moved, and the landmarks that they and the newest one see.
-void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
-                                 KeyframeId newest, BundleResult& result) {
-  std::vector<LandmarkId> seen = map.at(newest).landmarks;
-  for (const std::uint32_t pose : moved) {
-    const Keyframe* keyframe = map.find(keyframe_of_[pose]);
-    if (keyframe == nullptr) continue;
-    const Rigid3d estimate = solver_->pose(pose);
-    if (!is_off(*keyframe, estimate)) continue;
-    result.cam_from_world.emplace_back(keyframe->id, estimate);
-    seen.insert(seen.end(), keyframe->landmarks.begin(), keyframe->landmarks.end());
-  }
-  std::sort(seen.begin(), seen.end());
-  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-  for (const LandmarkId id : seen) {
-    const auto found = landmarks_.find(id);
-    if (found == landmarks_.end()) continue;
-    solver_->place(found->second.point);
-    const Eigen::Vector3d estimate = solver_->point(found->second.point);
-    if (estimate.allFinite()) result.point_in_world.emplace_back(id, estimate);
-  }
 }
 
 // The solver let go of these poses and of all observations of what they see.

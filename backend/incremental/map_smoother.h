@@ -46,12 +46,17 @@ class MapSmoother {
   // still, ascending. To be called each time, before the update that sees it.
   void renumber(KeyframeId keyframe, std::span<const std::uint32_t> kept);
 
-  // The map as it is now, with `newest` in it. The result holds what moved, and as outliers the
-  // observations beyond their threshold of the landmarks that `newest` sees: they are out of the
-  // smoother's problem, and the map is to follow.
+  // The map as it is now, with `newest` in it. The result holds what moved, far from the newest
+  // keyframes as much of it as near them (rest() has what is left; after a loop nothing is), and as
+  // outliers the observations beyond their threshold of the landmarks that `newest` sees: they are
+  // out of the smoother's problem, and the map is to follow.
   // `stop`: see IncrementalSolver::update.
   BundleResult update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
                       const std::stop_token& stop = {});
+
+  // What results have yet to say of keyframes that moved, all of it; to be taken in before others
+  // move the map, and at the end. `map`: the last update's, with what came since.
+  BundleResult rest(const MapSnapshot& map);
 
   // How certain the keyframes are, as of the last update: of the map's newest one of each camera,
   // then of those that share most landmarks with these, and of those that come with them, up to a
@@ -85,7 +90,8 @@ class MapSmoother {
   void take_in_keyframes(const MapSnapshot& map, KeyframeId last);
   void let_keyframes_go(const MapSnapshot& map);
   void follow_moves(const MapSnapshot& map);
-  bool is_off(const Keyframe& keyframe, const Rigid3d& estimate) const;
+  double off_by(const Keyframe& keyframe) const;
+  bool stayed(const Keyframe& keyframe) const;
   void take_in_loops(const MapSnapshot& map);
   void take_in_landmark(const MapSnapshot& map, LandmarkId id);
   void take_in_odometry(const MapSnapshot& map);
@@ -94,8 +100,10 @@ class MapSmoother {
   std::uint32_t add_observation(const MapSnapshot& map, std::uint32_t point,
                                 const Observation& seen);
   void set_outliers_aside(const MapSnapshot& map, KeyframeId newest, BundleResult& result);
+  void write(const MapSnapshot& map, const std::vector<KeyframeId>& keyframes,
+             std::vector<LandmarkId> seen, BundleResult& result);
   void write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
-                      KeyframeId newest, BundleResult& result);
+                      KeyframeId newest, bool all, BundleResult& result);
   void forget_marginalized(const MapSnapshot& map, const std::vector<std::uint32_t>& poses);
 
   MapSmootherOptions options_;
@@ -105,6 +113,7 @@ class MapSmoother {
   std::vector<std::uint32_t> pose_of_;   // by keyframe
   std::vector<KeyframeId> keyframe_of_;  // by pose
   std::vector<KeyframeId> gone_;         // keyframes whose poses the solver has still
+  std::vector<std::uint32_t> behind_;    // poses of which the map has yet to be told; ascending
   std::unordered_map<LandmarkId, KnownLandmark> landmarks_;
   std::unordered_map<KeyframeId, KnownOdometry> odometry_;
   std::vector<PoseConstraint> new_loops_;

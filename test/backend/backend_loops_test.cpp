@@ -148,6 +148,7 @@ TEST_CASE("backend: an adjustment of everything is carried over a loop that was 
   // The loop is not undone, and where both corrected the same, the smoother has the last word.
   CHECK(circle.worst_error() < open);
   backend.optimize_local(circle.keyframes.back());
+  backend.catch_up();
   CHECK(circle.worst_error() < 0.3 * open);
   CHECK_THROWS_AS(backend.take_in_full({}, 2), std::logic_error);
   backend.optimize_full();  // of the closed map: an older result is left out from now on

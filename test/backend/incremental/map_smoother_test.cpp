@@ -230,6 +230,7 @@ TEST_CASE("A map grown with the smoother is as good as after bundle adjustment o
   options.full.problem.rounds = {{50, Loss::kHuber, 1e-10}};
   Backend backend(options);
   const std::vector<Rigid3d> truth = grow(make_synthetic_scene(scene), backend, 0.01);
+  backend.catch_up();
   const double grown = worst_position_error(backend.view(), truth);
   const BundleSummary full = backend.optimize_full();
   const double adjusted = worst_position_error(backend.view(), truth);
@@ -237,6 +238,86 @@ TEST_CASE("A map grown with the smoother is as good as after bundle adjustment o
   CHECK(full.observations > 2000);
   CHECK(grown < 1.1 * adjusted);
   CHECK(adjusted < 0.05);
+}
+
+double off(const MapSnapshot& map, const MapSmoother& smoother, KeyframeId id) {
+  // Poses of the solver are numbered as the keyframes are.
+  return (smoother.solver().pose(id.value).params - map.at(id).cam_from_world.params).norm();
+}
+
+// A long row of keyframes, all but the newest ones moved aside by others: the smoother finds them
+// back where they were.
+TEST_CASE("What moves far from the newest keyframes is told by and by, and at once when asked") {
+  SyntheticSceneOptions options;
+  options.trajectory = SceneTrajectory::kCorridor;
+  options.times = 150;
+  options.step = 3;
+  options.landmarks = 6000;
+  FilledMap filled = fill_map(make_synthetic_scene(options), {});
+  MapSmootherOptions lenient;  // no outliers
+  lenient.solver.chi2_mono = lenient.solver.chi2_stereo = 1e300;
+  MapSmoother smoother(lenient);
+  const KeyframeId newest = filled.keyframes.back();
+  const auto take_in = [&](const BundleResult& result) {
+    filled.map.move(result.cam_from_world, result.point_in_world);
+    return result;
+  };
+  take_in(smoother.update(filled.map.snapshot(), newest));
+  CHECK(smoother.rest(filled.map.view()).cam_from_world.empty());  // a new map: all of it
+  std::vector<std::pair<KeyframeId, Rigid3d>> aside;
+  const Keyframe& last = filled.map.view().at(newest);
+  for (const KeyframeId id : filled.keyframes) {
+    if (id == filled.map.view().origin() || id == newest) continue;
+    Rigid3d pose = filled.map.view().at(id).cam_from_world;
+    pose.params.tail<3>() += 0.02 * Eigen::Vector3d::Unit(id.value % 3);
+    aside.emplace_back(id, pose);
+  }
+  filled.map.move(aside, {});
+  const auto is_near = [&](KeyframeId id) {
+    return id == newest || std::any_of(last.covisible.begin(), last.covisible.end(),
+                                       [&](const Covisible& one) { return one.id == id; });
+  };
+  const std::size_t near_ones = last.covisible.size() + 1;
+  REQUIRE(near_ones < filled.keyframes.size() / 3);
+
+  const BundleResult first = take_in(smoother.update(filled.map.snapshot(), newest));
+  std::size_t behind = 0;
+  for (const KeyframeId id : filled.keyframes) {
+    if (is_near(id)) CHECK(off(filled.map.view(), smoother, id) < 2 * lenient.min_motion);
+    behind += off(filled.map.view(), smoother, id) > 1e-3 ? 1 : 0;
+  }
+  CHECK(first.cam_from_world.size() < filled.keyframes.size() * 2 / 3);
+  CHECK(behind > filled.keyframes.size() / 4);
+
+  SECTION("by and by") {
+    std::size_t updates = 0;
+    while (behind > 0 && updates < 20) {
+      take_in(smoother.update(filled.map.snapshot(), newest));
+      ++updates;
+      behind = 0;
+      for (const KeyframeId id : filled.keyframes) {
+        behind += off(filled.map.view(), smoother, id) > 1e-3 ? 1 : 0;
+      }
+    }
+    CHECK(behind == 0);
+    CHECK(updates > 1);
+  }
+  SECTION("at once, but for what others have moved meanwhile") {
+    KeyframeId moved;
+    for (const KeyframeId id : filled.keyframes) {
+      if (off(filled.map.view(), smoother, id) > 1e-3) moved = id;
+    }
+    Rigid3d by_others = filled.map.view().at(moved).cam_from_world;
+    by_others.params.tail<3>() += Eigen::Vector3d(0.5, 0, 0);
+    filled.map.move({{moved, by_others}}, {});
+    const BundleResult rest = take_in(smoother.rest(filled.map.view()));
+    CHECK(rest.cam_from_world.size() + 1 == behind);
+    for (const KeyframeId id : filled.keyframes) {
+      if (id != moved) CHECK(off(filled.map.view(), smoother, id) < 1e-3);
+    }
+    CHECK(filled.map.view().at(moved).cam_from_world.params == by_others.params);
+    CHECK(smoother.rest(filled.map.view()).cam_from_world.empty());
+  }
 }
 
 // What is handed out is enough to have any covariance without the solver, as the solver has it.

@@ -1,0 +1,175 @@
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "backend/incremental/incremental_solver.h"
+#include "backend/incremental/map_smoother.h"
+
+// What a MapSmoother tells its map.
+
+namespace hybrid_slam {
+
+namespace {
+
+// Of the tree that is handed out for covariances: 0.8 MB at most, and a frame that needs all of it
+// solves for six columns in half a millisecond. A map without loops needs a tenth of that.
+constexpr std::size_t kMaxCovarianceNumbers = 100000;
+
+// The newest keyframe of each camera, then those that share landmarks with them, most first.
+std::vector<KeyframeId> newest_and_neighbours(const MapSnapshot& map) {
+  std::vector<KeyframeId> found;
+  std::vector<char> has(map.camera_count(), 0);
+  for (std::uint32_t id = map.next_keyframe_id().value; id-- > 0;) {
+    const Keyframe* keyframe = map.find(KeyframeId(id));
+    if (keyframe == nullptr || has[keyframe->observations->camera.value]) continue;
+    has[keyframe->observations->camera.value] = 1;
+    found.push_back(keyframe->id);
+    if (found.size() == has.size()) break;
+  }
+  std::vector<Covisible> neighbours;
+  for (const KeyframeId id : found) {
+    const std::vector<Covisible>& those = map.at(id).covisible;
+    neighbours.insert(neighbours.end(), those.begin(), those.end());
+  }
+  std::stable_sort(neighbours.begin(), neighbours.end(),
+                   [](const Covisible& a, const Covisible& b) {
+                     return a.shared_landmarks > b.shared_landmarks;
+                   });
+  for (const Covisible& one : neighbours) found.push_back(one.id);
+  return found;
+}
+
+// Landmarks that these keyframes see, and these, once each.
+std::vector<LandmarkId> seen_by(const MapSnapshot& map, const std::vector<KeyframeId>& keyframes,
+                                std::vector<LandmarkId> seen) {
+  for (const KeyframeId id : keyframes) {
+    const std::vector<LandmarkId>& those = map.at(id).landmarks;
+    seen.insert(seen.end(), those.begin(), those.end());
+  }
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  return seen;
+}
+
+}  // namespace
+
+std::shared_ptr<const KeyframeCovariances> MapSmoother::covariances(const MapSnapshot& map) const {
+  std::vector<std::uint32_t> poses;
+  for (const KeyframeId id : newest_and_neighbours(map)) {
+    if (id.value < pose_of_.size() && pose_of_[id.value] != kNone) {
+      poses.push_back(pose_of_[id.value]);
+    }
+  }
+  IncrementalSolver::PosePaths found = solver_->paths(poses, kMaxCovarianceNumbers);
+  std::vector<KeyframeCovariances::Known> known;
+  for (const auto& pose : found.poses) {
+    known.push_back({keyframe_of_[pose.pose], pose.at, pose.by_variable});
+  }
+  std::sort(known.begin(), known.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+  return std::make_shared<const KeyframeCovariances>(map.origin(), std::move(found.paths),
+                                                     std::move(known));
+}
+
+void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
+                                     BundleResult& result) {
+  const IncrementalOptions& options = options_.solver;
+  for (const LandmarkId id : map.at(newest).landmarks) {
+    const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
+    if (found == landmarks_.end()) continue;
+    std::erase_if(found->second.views, [&](const View& view) {
+      if (view.in_solver == kNone) return false;
+      const bool stereo = map.at(view.seen.keyframe).observations->has_right(view.seen.keypoint);
+      if (solver_->chi2(view.in_solver) <= (stereo ? options.chi2_stereo : options.chi2_mono)) {
+        return false;
+      }
+      solver_->remove_observation(view.in_solver);
+      result.outliers.push_back({id, view.seen});
+      return true;  // forgotten: where the map takes it in again, it is a new one
+    });
+  }
+}
+
+void MapSmoother::write(const MapSnapshot& map, const std::vector<KeyframeId>& keyframes,
+                        std::vector<LandmarkId> seen, BundleResult& result) {
+  for (const KeyframeId id : keyframes) {
+    result.cam_from_world.emplace_back(id, solver_->pose(pose_of_[id.value]));
+  }
+  for (const LandmarkId id : seen_by(map, keyframes, std::move(seen))) {
+    const auto found = landmarks_.find(id);
+    if (found == landmarks_.end()) continue;
+    solver_->place(found->second.point);
+    const Eigen::Vector3d estimate = solver_->point(found->second.point);
+    if (estimate.allFinite()) result.point_in_world.emplace_back(id, estimate);
+  }
+}
+
+// Of the keyframes behind the estimate those that the newest ones share landmarks with, at once.
+// Others wait for their turn, farthest off first: an update writes about as much of them as of what
+// is near, or each would cost as much as the whole map while a loop's last tenths of a millimetre
+// settle.
+void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
+                                 KeyframeId newest, bool all, BundleResult& result) {
+  std::vector<KeyframeId> near = newest_and_neighbours(map);
+  near.push_back(newest);
+  std::sort(near.begin(), near.end());
+  std::vector<std::uint32_t> behind;
+  std::set_union(behind_.begin(), behind_.end(), moved.begin(), moved.end(),
+                 std::back_inserter(behind));
+  std::vector<KeyframeId> at_once;
+  std::vector<std::pair<double, KeyframeId>> others;
+  for (const std::uint32_t pose : behind) {
+    const Keyframe* keyframe = map.find(keyframe_of_[pose]);
+    if (keyframe == nullptr) continue;
+    const double off = off_by(*keyframe);
+    if (!(off > options_.min_motion)) continue;
+    if (all || std::binary_search(near.begin(), near.end(), keyframe->id)) {
+      at_once.push_back(keyframe->id);
+    } else {
+      others.emplace_back(-off, keyframe->id);
+    }
+  }
+  write(map, at_once, map.at(newest).landmarks, result);
+
+  std::sort(others.begin(), others.end());
+  std::size_t enough = 0;
+  for (const KeyframeId id : near) enough += map.at(id).landmarks.size();
+  std::vector<KeyframeId> next;
+  behind_.clear();
+  for (std::size_t i = 0, seen = 0; i < others.size(); ++i) {
+    const KeyframeId id = others[i].second;
+    seen += map.at(id).landmarks.size();
+    if (seen <= enough) {
+      next.push_back(id);
+    } else {
+      behind_.push_back(pose_of_[id.value]);
+    }
+  }
+  write(map, next, {}, result);
+  std::sort(behind_.begin(), behind_.end());
+}
+
+BundleResult MapSmoother::rest(const MapSnapshot& map) {
+  BundleResult result;
+  std::vector<KeyframeId> keyframes;
+  for (const std::uint32_t pose : std::exchange(behind_, {})) {
+    const Keyframe* keyframe = map.find(keyframe_of_[pose]);
+    if (keyframe != nullptr && stayed(*keyframe)) keyframes.push_back(keyframe->id);
+  }
+  write(map, keyframes, {}, result);
+  return result;
+}
+
+// By how much the map is behind the estimate [m, rad].
+double MapSmoother::off_by(const Keyframe& keyframe) const {
+  return (solver_->pose(pose_of_[keyframe.id.value]).params - keyframe.cam_from_world.params)
+      .lpNorm<Eigen::Infinity>();
+}
+
+// Nobody has moved the keyframe since the last update.
+bool MapSmoother::stayed(const Keyframe& keyframe) const {
+  const Keyframe* before = known_map_->find(keyframe.id);
+  return before != nullptr && before->cam_from_world.params == keyframe.cam_from_world.params;
+}
+
+}  // namespace hybrid_slam
