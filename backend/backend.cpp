@@ -95,6 +95,7 @@ void Backend::apply(const MapEdit& edit) { map_.apply(edit); }
 void Backend::set_keep(KeyframeId id) { map_.set_keep(id); }
 
 void Backend::drop_features(const std::vector<KeyframeId>& keyframes) {
+  require_no_update("drop_features");
   for (const KeyframeId id : keyframes) {
     const std::vector<std::uint32_t> kept = map_.drop_features(id);
     if (smoother_) smoother_->renumber(id, kept);
@@ -109,6 +110,7 @@ void Backend::set_correction(CameraId camera, const RigCorrection& correction) {
 }
 
 void Backend::shift_disparities(CameraId camera, double by, KeyframeId first) {
+  require_no_update("shift_disparities");
   BundleResult as_it_was;
   for (const KeyframeId id : view().keyframe_ids()) {
     as_it_was.cam_from_world.emplace_back(id, view().at(id).cam_from_world);
@@ -127,15 +129,45 @@ void Backend::shift_disparities(CameraId camera, double by, KeyframeId first) {
 }
 
 BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
-  if (options_.local_method == LocalMethod::kBundle) {
-    return take_in(solve_bundle(view(), make_local_bundle(view(), newest, options_.local), stop));
+  LocalUpdate update = begin_local(newest);
+  update.run(stop);
+  return end_local(std::move(update));
+}
+
+LocalUpdate Backend::begin_local(KeyframeId newest) {
+  require_no_update("begin_local");
+  LocalUpdate update(snapshot(), newest);
+  update.local_ = options_.local;
+  if (options_.local_method == LocalMethod::kIncremental) update.smoother_ = &smoother();
+  updating_ = true;
+  return update;
+}
+
+void LocalUpdate::run(const std::stop_token& stop) {
+  if (smoother_ == nullptr) {
+    result_ = solve_bundle(*map_, make_local_bundle(*map_, newest_, local_), stop);
+    return;
   }
-  const BundleSummary summary = take_in(smoother().update(snapshot(), newest, stop));
-  map_.set_covariances(smoother_->covariances(view()));
+  result_ = smoother_->update(map_, newest_, stop);
+  covariances_ = smoother_->covariances(*map_);
+}
+
+BundleSummary Backend::end_local(LocalUpdate update) {
+  updating_ = false;
+  carry_newcomers(*update.map_, view(), update.result_);
+  const BundleSummary summary = take_in(std::move(update.result_));
+  if (update.covariances_ != nullptr) map_.set_covariances(std::move(update.covariances_));
   return summary;
 }
 
+void Backend::require_no_update(const char* what) const {
+  if (updating_) {
+    throw std::logic_error(std::string("Backend::") + what + ": a local update is not ended");
+  }
+}
+
 void Backend::catch_up() {
+  require_no_update("catch_up");
   if (smoother_) take_in(smoother_->rest(view()));
 }
 
@@ -251,6 +283,7 @@ BundleResult solve_full(const MapSnapshot& map, const FullBundleOptions& options
 }
 
 BundleSummary Backend::take_in_full(BundleResult result, std::size_t closings_then) {
+  require_no_update("take_in_full");
   if (closings_then > closings()) {
     throw std::logic_error("Backend::take_in_full: a result of loops that were not closed");
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "backend/incremental/map_smoother.h"
+#include "backend/local_update.h"
 #include "backend/map/loop_measurement.h"
 #include "backend/map/map.h"
 #include "backend/problem/full_bundle.h"
@@ -77,6 +78,12 @@ class Backend {
   // when stopped.
   BundleSummary optimize_local(KeyframeId newest, std::stop_token stop = {});
 
+  // The same in steps, so that the work can be done beside. Between the two keyframes may be added
+  // and edits applied: what came since is carried along. All that moves the map or renumbers
+  // keypoints has to wait for end_local(): std::logic_error.
+  LocalUpdate begin_local(KeyframeId newest);
+  BundleSummary end_local(LocalUpdate update);
+
   // Takes in what optimize_local() found far from the newest keyframes and has left for later.
   void catch_up();
 
@@ -112,10 +119,12 @@ class Backend {
   MapSmoother& smoother();
   void moved_by_others(bool cameras_too);
   void forget_moves(std::size_t count);
+  void require_no_update(const char* what) const;
 
   BackendOptions options_;
   Map map_;
   std::optional<MapSmoother> smoother_;   // in step with the map
+  bool updating_ = false;                 // between begin_local() and end_local()
   std::vector<LoopMeasurement> refused_;  // oldest first
   std::vector<PoseConstraint> closed_;    // loops, as measured, weighted
   // What close() did to the map, for results that are still to come: the newest, oldest first.

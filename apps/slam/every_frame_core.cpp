@@ -29,7 +29,7 @@ class EveryFrameCore final : public SlamCore {
   void take(CameraFrame frame) override {
     const auto job = tracking_.track(std::move(frame), *map());
     if (!job) return;
-    const KeyframeId id = mapping_.process(*job, times_, {}, [this] { publish(); });
+    const KeyframeId id = mapping_.process(*job, times_, [this] { publish(); });
     observers_.keyframe({job->camera, job->frame_index(), id});
     observers_.map(map(), MapChange::kKeyframe);
     close_loop(id);

@@ -59,8 +59,18 @@ CameraId LocalMapping::camera_id(const Camera& camera) {
   return backend_.add_camera(camera);
 }
 
-KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::stop_token stop,
+KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times,
                                  const std::function<void()>& publish) {
+  const KeyframeId id = insert(job, times);
+  publish();
+  LocalUpdate update = begin_update(id);
+  update.run();
+  end_update(std::move(update), {&id, 1}, times);
+  publish();
+  return id;
+}
+
+KeyframeId LocalMapping::insert(const MappingJob& job, StageTimes& times) {
   StageClock clock(times);
   MapEdit counts;
   counts.counted = job.counts;
@@ -76,49 +86,83 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times, std::
   clock.lap("triangulate");
   backend_.apply(fuse_with_neighbours(backend_.view(), id, options_.fusion));
   clock.lap("fuse");
-  publish();
-  backend_.optimize_local(id, std::move(stop));
-  clock.lap("local_bundle");
-  backend_.apply(cull_keyframes(backend_.view(), id, options_.culling));
-  clock.lap("cull_keyframes");
-  backend_.drop_features(use_.gone_out(backend_.view()));
-  clock.lap("drop_features");
-  publish();
   return id;
 }
 
+void LocalMapping::end_update(LocalUpdate update, std::span<const KeyframeId> added,
+                              StageTimes& times) {
+  times.add("local_bundle", 1e3 * update.seconds());
+  StageClock clock(times);
+  backend_.end_local(std::move(update));
+  clock.lap("take_in_local_bundle");
+  for (const KeyframeId id : added) {
+    if (backend_.view().find(id) == nullptr) continue;
+    backend_.apply(cull_keyframes(backend_.view(), id, options_.culling));
+  }
+  clock.lap("cull_keyframes");
+  backend_.drop_features(use_.gone_out(backend_.view()));
+  clock.lap("drop_features");
+}
+
+// Of the disparities of this run's stereo keyframes [px].
+double LocalMapping::in_use(CameraId stereo) const {
+  if (disparity_offset_) return *disparity_offset_;
+  const auto known = backend_.view().correction(stereo).disparity;
+  return known ? known->in_use : 0;
+}
+
+// Of a rig that is hardly off, what was found is left to the keyframes to come: less than the map
+// may be off by anyway is not worth moving all of it.
+bool LocalMapping::is_worth_a_shift(CameraId stereo, const FrameObservations& seen,
+                                    double offset) const {
+  const double before = in_use(stereo);
+  const double disparity = median_disparity(seen.features, seen.u_right);
+  return offset != before && disparity > 0 &&
+         std::max(std::abs(offset), std::abs(before)) >= kDoubtfulScale * disparity;
+}
+
+bool LocalMapping::moves_the_map(const MappingJob& job) const {
+  const FrameObservations& seen = *job.keyframe.observations;
+  return job.camera == CameraKind::kStereo &&
+         is_worth_a_shift(seen.camera, seen, job.disparity_offset);
+}
+
 // What was found out about the pair meanwhile holds for all keyframes of this run, not for the new
-// ones alone. Of a rig that is hardly off, it is left to those to come: less than the map may be
-// off by anyway is not worth moving all of it. Keyframes of runs before keep what these have found:
-// it is the better, or the pair stood otherwise. `seen`: by the pair, lately.
+// ones alone. Keyframes of runs before keep what these have found: it is the better, or the pair
+// stood otherwise. `seen`: by the pair, lately.
 void LocalMapping::take_in(CameraId stereo, const RigCorrection& correction,
                            const FrameObservations& seen, double offset) {
-  if (!disparity_offset_) {
-    const auto known = backend_.view().correction(stereo).disparity;
-    disparity_offset_ = known ? known->in_use : 0;
-  }
+  disparity_offset_ = in_use(stereo);
   backend_.set_correction(stereo, correction);
-  const double by = offset - *disparity_offset_;
-  const double most = std::max(std::abs(offset), std::abs(*disparity_offset_));
-  const double disparity = median_disparity(seen.features, seen.u_right);
-  if (by == 0 || !(disparity > 0) || most < kDoubtfulScale * disparity) return;
-  backend_.shift_disparities(stereo, by, first_own_);
+  if (!is_worth_a_shift(stereo, seen, offset)) return;
+  backend_.shift_disparities(stereo, offset - *disparity_offset_, first_own_);
   if (options_.backend.full.enabled) backend_.optimize_full();
   disparity_offset_ = offset;
 }
 
 LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
                                 const std::function<void()>& publish) {
+  const LoopOutcome outcome = move_to(loop, times);
+  if (outcome.end != LoopEnd::kClosed) return outcome;
+  LocalUpdate update = begin_update(loop.keyframe);
+  update.run();
+  end_update(std::move(update), {}, times);
+  fuse_sides(loop, times);
+  publish();
+  return outcome;
+}
+
+LoopOutcome LocalMapping::move_to(const LoopMeasurement& loop, StageTimes& times) {
   StageClock clock(times);
   const LoopOutcome outcome = backend_.close(loop);
   clock.lap("close_loop");
-  if (outcome.end != LoopEnd::kClosed) return outcome;
-  backend_.optimize_local(loop.keyframe);
-  clock.lap("local_bundle");
+  return outcome;
+}
+
+void LocalMapping::fuse_sides(const LoopMeasurement& loop, StageTimes& times) {
+  StageClock clock(times);
   backend_.apply(fuse_places(backend_.view(), loop.keyframe, loop.match, options_.fusion));
   clock.lap("fuse");
-  publish();
-  return outcome;
 }
 
 void LocalMapping::take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times,

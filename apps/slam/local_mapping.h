@@ -5,7 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <stop_token>
+#include <span>
 #include <vector>
 
 #include "apps/io/stage_times.h"
@@ -62,14 +62,27 @@ class LocalMapping {
   CameraId camera_id(const Camera& camera);
 
   // `publish` is called whenever the map is worth looking at: once it holds the keyframe, and at
-  // the end. `stop` cuts the bundle adjustment short.
-  KeyframeId process(const MappingJob& job, StageTimes& times, std::stop_token stop,
+  // the end.
+  KeyframeId process(const MappingJob& job, StageTimes& times,
                      const std::function<void()>& publish);
+
+  // The same in steps. The keyframe comes into the map and is linked with its neighbours; not while
+  // an update works if moves_the_map(job).
+  KeyframeId insert(const MappingJob& job, StageTimes& times);
+  bool moves_the_map(const MappingJob& job) const;
+  // The map is optimised, beside: see LocalUpdate.
+  LocalUpdate begin_update(KeyframeId newest) { return backend_.begin_local(newest); }
+  // Takes that in, and culls what these new keyframes make redundant.
+  void end_update(LocalUpdate update, std::span<const KeyframeId> added, StageTimes& times);
 
   // Closes a verified loop: moves the map, joins the two sides and looks for more that they have in
   // common. `publish` is called if it was closed.
   LoopOutcome close(const LoopMeasurement& loop, StageTimes& times,
                     const std::function<void()>& publish);
+
+  // The same in steps: if it was closed, an update from its keyframe on belongs between these.
+  LoopOutcome move_to(const LoopMeasurement& loop, StageTimes& times);
+  void fuse_sides(const LoopMeasurement& loop, StageTimes& times);
 
   // How often the map was moved by a loop.
   std::size_t closings() const { return backend_.closings(); }
@@ -91,6 +104,8 @@ class LocalMapping {
  private:
   void take_in(CameraId stereo, const RigCorrection& correction, const FrameObservations& seen,
                double offset);
+  double in_use(CameraId stereo) const;
+  bool is_worth_a_shift(CameraId stereo, const FrameObservations& seen, double offset) const;
 
   SlamOptions options_;
   Backend backend_;

@@ -7,12 +7,13 @@
 namespace hybrid_slam {
 
 MappingWorker::MappingWorker(LocalMapping& mapping, const Vocabulary& vocabulary,
-                             MappingEvents events)
+                             MappingEvents events, bool beside)
     : mapping_(mapping),
       events_(std::move(events)),
       tasks_(kKeyframeBacklog + kOthers),
       places_(vocabulary) {
   publish();
+  if (beside) updates_.emplace([this] { tasks_.push(UpdateDone{}); });
   thread_ = std::jthread([this] { work(); });
 }
 
@@ -20,11 +21,6 @@ void MappingWorker::publish() {
   auto map = reaper_.adopt(mapping_.snapshot());
   places_.follow(*map);
   snapshots_.publish(reaper_.adopt(std::make_shared<const PublishedMap>(std::move(map), places_)));
-}
-
-void MappingWorker::hurry() {
-  const std::lock_guard lock(mutex_);
-  current_.request_stop();
 }
 
 void MappingWorker::finish() {
@@ -44,7 +40,12 @@ void MappingWorker::work() {
   give_way();
   try {
     while (auto task = tasks_.pop()) {
-      std::visit([this](auto& one) { run(one); }, *task);
+      std::visit([this](auto& one) { take(one); }, *task);
+      go_on();
+    }
+    while (updating_) {  // nothing new comes; what did is brought to its end
+      end_update(updates_->take());
+      go_on();
     }
   } catch (...) {
     failure_ = std::current_exception();
@@ -53,19 +54,49 @@ void MappingWorker::work() {
   snapshots_.close();
 }
 
-void MappingWorker::run(MappingJob& job) {
-  std::stop_source stop;
-  {
-    const std::lock_guard lock(mutex_);
-    current_ = stop;
+void MappingWorker::take(MappingJob& job) {
+  if (updating_ && mapping_.moves_the_map(job)) end_update(updates_->take());
+  const KeyframeId id = mapping_.insert(job, times_);
+  publish();
+  inserted_.push_back({job.camera, job.frame_index(), id});
+}
+
+void MappingWorker::take(UpdateDone&) {
+  if (updating_ && updates_->is_done()) end_update(updates_->take());
+}
+
+// While no update works: what moves the map first, then what was added is optimised.
+void MappingWorker::go_on() {
+  while (!updating_ && (!moves_.empty() || !inserted_.empty())) {
+    if (!moves_.empty()) {
+      Move move = std::move(moves_.front());
+      moves_.pop_front();
+      std::visit([this](auto& one) { run(one); }, move);
+    } else {
+      in_update_ = std::exchange(inserted_, {});
+      begin_update(newest_left());
+    }
   }
-  const KeyframeId id = mapping_.process(job, times_, stop.get_token(), [this] { publish(); });
-  events_.mapped({job.camera, job.frame_index(), id}, snapshot());
+}
+
+// Of those that were added, unless all were culled meanwhile; then of the map.
+KeyframeId MappingWorker::newest_left() const {
+  const MapSnapshot& map = mapping_.map().view();
+  for (auto one = in_update_.rbegin(); one != in_update_.rend(); ++one) {
+    if (map.find(one->id) != nullptr) return one->id;
+  }
+  return map.keyframe_ids().back();
 }
 
 void MappingWorker::run(LoopMeasurement& loop) {
-  const LoopOutcome outcome = mapping_.close(loop, times_, [this] { publish(); });
-  events_.looped(outcome, snapshot(), mapping_.closings());
+  const LoopOutcome outcome = mapping_.move_to(loop, times_);
+  if (outcome.end != LoopEnd::kClosed) {
+    events_.looped(outcome, snapshot(), mapping_.closings());
+    return;
+  }
+  publish();
+  closing_.emplace(std::move(loop), outcome);
+  begin_update(closing_->first.keyframe);
 }
 
 void MappingWorker::run(FullCorrection& correction) {
@@ -73,6 +104,30 @@ void MappingWorker::run(FullCorrection& correction) {
                         [this] { publish(); });
   loops_adjusted_ = correction.loops_closed;
   events_.adjusted(snapshot());
+}
+
+void MappingWorker::begin_update(KeyframeId newest) {
+  LocalUpdate update = mapping_.begin_update(newest);
+  if (updates_) {
+    updating_ = true;
+    updates_->start(std::move(update));
+  } else {
+    update.run();
+    end_update(std::move(update));
+  }
+}
+
+void MappingWorker::end_update(LocalUpdate update) {
+  updating_ = false;
+  const std::vector<KeyframeResult> added = std::exchange(in_update_, {});
+  std::vector<KeyframeId> ids;
+  for (const KeyframeResult& keyframe : added) ids.push_back(keyframe.id);
+  mapping_.end_update(std::move(update), ids, times_);
+  const auto closing = std::exchange(closing_, std::nullopt);
+  if (closing) mapping_.fuse_sides(closing->first, times_);
+  publish();
+  if (closing) events_.looped(closing->second, snapshot(), mapping_.closings());
+  for (const KeyframeResult& keyframe : added) events_.mapped(keyframe, snapshot());
 }
 
 }  // namespace hybrid_slam

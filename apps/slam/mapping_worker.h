@@ -1,17 +1,20 @@
 #pragma once
 
+#include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
-#include <stop_token>
+#include <optional>
 #include <thread>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "apps/slam/channel.h"
 #include "apps/slam/local_mapping.h"
 #include "apps/slam/reaper.h"
 #include "apps/slam/session_types.h"
+#include "apps/slam/update_worker.h"
 #include "frontend/place_recognition/keyframe_database.h"
 
 namespace hybrid_slam {
@@ -42,7 +45,10 @@ struct PublishedMap {
 // out.
 class MappingWorker {
  public:
-  MappingWorker(LocalMapping& mapping, const Vocabulary& vocabulary, MappingEvents events);
+  // `beside`: the map is optimised in another thread, so that a keyframe comes into it at once,
+  // whatever that takes; several of them may then be optimised together. Else one by one.
+  MappingWorker(LocalMapping& mapping, const Vocabulary& vocabulary, MappingEvents events,
+                bool beside);
   ~MappingWorker() { finish(); }
 
   // Whether a keyframe would not have to wait. From the one thread that adds keyframes.
@@ -52,11 +58,6 @@ class MappingWorker {
   bool add(MappingJob job) { return tasks_.push(std::move(job)); }
   bool add(LoopMeasurement loop) { return tasks_.push(std::move(loop)); }
   bool add(FullCorrection correction) { return tasks_.push(std::move(correction)); }
-
-  // Where time presses, a keyframe is worth more than the last iterations of the one before: its
-  // adjustment is cut short. Before the new one is added, so that it cannot be the one that is
-  // stopped.
-  void hurry();
 
   // Until the worker has begun with the last task it was given.
   void wait_until_taken() { tasks_.wait_empty(); }
@@ -89,22 +90,39 @@ class MappingWorker {
   static constexpr std::size_t kKeyframeBacklog = 3;
   static constexpr std::size_t kOthers = 3;
 
+  // A local update has been run.
+  struct UpdateDone {};
+  // What moves the map: it waits until no update works.
+  using Move = std::variant<LoopMeasurement, FullCorrection>;
+
   void work();
-  void run(MappingJob& job);
+  void take(MappingJob& job);
+  void take(LoopMeasurement& loop) { moves_.emplace_back(std::move(loop)); }
+  void take(FullCorrection& correction) { moves_.emplace_back(std::move(correction)); }
+  void take(UpdateDone&);
+  void go_on();
   void run(LoopMeasurement& loop);
   void run(FullCorrection& correction);
+  KeyframeId newest_left() const;
+  void begin_update(KeyframeId newest);
+  void end_update(LocalUpdate update);
 
   LocalMapping& mapping_;
   MappingEvents events_;
-  Channel<std::variant<MappingJob, LoopMeasurement, FullCorrection>> tasks_;
+  Channel<std::variant<MappingJob, LoopMeasurement, FullCorrection, UpdateDone>> tasks_;
   Reaper reaper_;  // of snapshots that nobody holds any more
   KeyframeDatabase places_;
   Latest<PublishedMap> snapshots_;
-  std::mutex mutex_;
-  std::stop_source current_;        // guarded by mutex_
-  StageTimes times_;                // the thread's own until finish()
-  std::size_t loops_adjusted_ = 0;  // likewise
-  std::exception_ptr failure_;      // likewise
+  // The thread's own until finish():
+  StageTimes times_;
+  std::size_t loops_adjusted_ = 0;
+  std::exception_ptr failure_;
+  std::vector<KeyframeResult> inserted_;   // since the last update began
+  std::vector<KeyframeResult> in_update_;  // those that the present one optimises
+  std::deque<Move> moves_;
+  std::optional<std::pair<LoopMeasurement, LoopOutcome>> closing_;  // in the present update
+  bool updating_ = false;                                           // beside
+  std::optional<UpdateWorker> updates_;
   std::jthread thread_;
 };
 

@@ -24,7 +24,7 @@ class RealtimeCore final : public SlamCore {
                   set_up.session.localize, local_mapping_, observers_, times_),
         checkpoints_(set_up.checkpoint, set_up.session.checkpoint_every,
                      [this](const SessionFailure& failure) { observers_.failure(failure); }),
-        mapping_(local_mapping_, set_up.session.vocabulary, events()) {
+        mapping_(local_mapping_, set_up.session.vocabulary, events(), paced_) {
     if (!set_up.options.loops.enabled || set_up.session.localize) return;
     const auto places = std::make_shared<KeyframeDatabase>(set_up.session.vocabulary);
     loop_closing_.emplace(places, set_up.options.loops.finder,
@@ -67,10 +67,8 @@ class RealtimeCore final : public SlamCore {
   }
 
  private:
-  // Where time presses, the keyframe before is cut short. The first one of the map, or of a
-  // component, is what there is to track against.
+  // The first one of the map, or of a component, is what there is to track against.
   void add_keyframe(MappingJob job) {
-    if (paced_) mapping_.hurry();
     const auto& odometry = job.keyframe.odometry;
     const bool first = !map()->origin().valid() || (odometry != nullptr && is_loose(*odometry));
     const CameraId camera = job.keyframe.observations->camera;

@@ -23,15 +23,25 @@ std::map<KeyframeId, Sim3d> corrections(const MapSnapshot& map, const MapGraph& 
   return moved;
 }
 
-// new_world_from_old_world of keyframes that a result moved, and of those that hang from them.
+// new_world_from_old_world of keyframes.
+using Moves = std::map<KeyframeId, Rigid3d>;
+
+// Of those that a result moves.
+Moves moves_of(const MapSnapshot& now, const BundleResult& result) {
+  Moves moves;
+  for (const auto& [id, cam_from_new] : result.cam_from_world) {
+    const Keyframe* keyframe = now.find(id);
+    if (keyframe == nullptr) continue;
+    moves.emplace(id, inverse(cam_from_new) * keyframe->cam_from_world);
+  }
+  return moves;
+}
+
+// The same, and of keyframes that hang from these.
 class Carrier {
  public:
-  Carrier(const MapSnapshot& now, const BundleResult& result) : now_(now) {
-    for (const auto& [id, cam_from_new] : result.cam_from_world) {
-      const Keyframe* keyframe = now.find(id);
-      if (keyframe == nullptr) continue;
-      new_from_old_.emplace(id, inverse(cam_from_new) * keyframe->cam_from_world);
-    }
+  Carrier(const MapSnapshot& now, const BundleResult& result)
+      : now_(now), new_from_old_(moves_of(now, result)) {
     new_from_old_.emplace(now.origin(), Rigid3d());
   }
 
@@ -44,7 +54,7 @@ class Carrier {
 
  private:
   const MapSnapshot& now_;
-  std::map<KeyframeId, Rigid3d> new_from_old_;
+  Moves new_from_old_;
 };
 
 }  // namespace
@@ -110,6 +120,25 @@ void carry_the_rest(const MapSnapshot& now, BundleResult& result) {
     const Landmark& landmark = now.at(id);
     result.point_in_world.emplace_back(
         id, carrier.new_from_old(landmark.reference) * landmark.point_in_world);
+  }
+}
+
+void carry_newcomers(const MapSnapshot& then, const MapSnapshot& now, BundleResult& result) {
+  if (now.next_keyframe_id() == then.next_keyframe_id()) return;
+  Moves moves = moves_of(now, result);
+  for (const KeyframeId id : now.keyframe_ids_from(then.next_keyframe_id())) {
+    const auto above = moves.find(now.at(id).parent);
+    if (above == moves.end()) continue;
+    const Rigid3d new_from_old = above->second;
+    result.cam_from_world.emplace_back(id, now.at(id).cam_from_world * inverse(new_from_old));
+    moves.emplace(id, new_from_old);
+  }
+  for (const LandmarkId id : now.changed_landmarks(then)) {
+    const Landmark* landmark = then.find(id) == nullptr ? now.find(id) : nullptr;
+    if (landmark == nullptr) continue;
+    const auto reference = moves.find(landmark->reference);
+    if (reference == moves.end()) continue;
+    result.point_in_world.emplace_back(id, reference->second * landmark->point_in_world);
   }
 }
 

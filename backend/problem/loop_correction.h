@@ -31,4 +31,8 @@ void carry_over(const LoopMove& move, const MapSnapshot& now, BundleResult& resu
 // by their reference keyframe.
 void carry_the_rest(const MapSnapshot& now, BundleResult& result);
 
+// The result says of `then` what moved. Adds what came into the map since: keyframes move as the
+// one above them in the spanning tree does, landmarks as their reference keyframe.
+void carry_newcomers(const MapSnapshot& then, const MapSnapshot& now, BundleResult& result);
+
 }  // namespace hybrid_slam

@@ -158,6 +158,49 @@ TEST_CASE("backend: an adjustment of everything is carried over a loop that was 
   CHECK(circle.worst_error() < 0.02);
 }
 
+TEST_CASE("backend: what comes in while a local update works is carried along") {
+  Backend backend(chain_backend());
+  OpenCircle circle(backend);
+  LocalUpdate update = backend.begin_local(circle.keyframes.back());
+  const auto began = backend.snapshot();
+  circle.second.assign(circle.second.size(), LandmarkId());
+  circle.add(25);  // once more, and all that it sees is new
+  const KeyframeId newcomer = circle.keyframes.back();
+  const auto before = backend.snapshot();
+  CHECK_THROWS_AS(backend.begin_local(newcomer), std::logic_error);
+  CHECK_THROWS_AS(backend.close(circle.loop()), std::logic_error);
+  CHECK_THROWS_AS(backend.take_in_full({}, 0), std::logic_error);
+  CHECK_THROWS_AS(backend.catch_up(), std::logic_error);
+  CHECK_THROWS_AS(backend.drop_features({newcomer}), std::logic_error);
+  CHECK(before->changed_keyframes(backend.view()).empty());
+
+  update.run();
+  backend.end_local(std::move(update));
+  const auto in_parent = [&](const MapSnapshot& map) {
+    return map.at(newcomer).cam_from_world *
+           inverse(map.at(before->at(newcomer).parent).cam_from_world);
+  };
+  const KeyframeId parent = before->at(newcomer).parent;
+  const Rigid3d moved =
+      backend.view().at(parent).cam_from_world * inverse(before->at(parent).cam_from_world);
+  REQUIRE(moved.translation().norm() > 1e-3);
+  CHECK((in_parent(backend.view()).params - in_parent(*before).params).norm() < 1e-12);
+  int carried = 0;
+  for (const LandmarkId id : backend.view().landmark_ids()) {
+    const Landmark& landmark = backend.view().at(id);
+    if (began->find(id) != nullptr) continue;
+    const Eigen::Vector3d then =
+        before->at(newcomer).cam_from_world * before->at(id).point_in_world;
+    const Eigen::Vector3d now =
+        backend.view().at(newcomer).cam_from_world * landmark.point_in_world;
+    CHECK((now - then).norm() < 1e-9);
+    ++carried;
+  }
+  CHECK(carried > 10);
+  CHECK(backend.map().check_consistency() == std::vector<std::string>{});
+  CHECK(backend.close(circle.loop()).end == LoopEnd::kClosed);
+}
+
 TEST_CASE("backend: a map that is too large for one adjustment has it in windows") {
   BackendOptions options = chain_backend();
   Backend whole(options);

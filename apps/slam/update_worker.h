@@ -1,0 +1,38 @@
+#pragma once
+
+#include <exception>
+#include <functional>
+#include <thread>
+
+#include "apps/slam/channel.h"
+#include "backend/local_update.h"
+
+namespace hybrid_slam {
+
+// Runs local updates in a thread of its own, one at a time: while it works, keyframes come into the
+// map without waiting.
+class UpdateWorker {
+ public:
+  // `done` is called in that thread when an update has been run; it must not wait for the thread.
+  explicit UpdateWorker(std::function<void()> done);
+  ~UpdateWorker();
+
+  void start(LocalUpdate update) { updates_.push(std::move(update)); }
+
+  // Whether the update that was started has been run.
+  bool is_done() const { return results_.size() > 0; }
+
+  // Waits for it. Throws what it threw.
+  LocalUpdate take();
+
+ private:
+  void work();
+
+  std::function<void()> done_;
+  Channel<LocalUpdate> updates_{1};
+  Channel<LocalUpdate> results_{1};
+  std::exception_ptr failure_;  // before results_ is closed
+  std::jthread thread_;
+};
+
+}  // namespace hybrid_slam

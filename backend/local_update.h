@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+#include <stop_token>
+
+#include "backend/map/map_snapshot.h"
+#include "backend/problem/local_bundle.h"
+#include "backend/problem/problem_config.h"
+
+namespace hybrid_slam {
+
+class MapSmoother;
+
+// The map optimised around its newest keyframe, by steps: Backend::begin_local() makes it of a
+// snapshot, run() works in any thread while the backend takes in keyframes, and
+// Backend::end_local() takes it in. The backend must outlive run().
+class LocalUpdate {
+ public:
+  // Looks at `stop` between iterations and keeps what it has when stopped.
+  void run(const std::stop_token& stop = {});
+
+  double seconds() const { return result_.summary.seconds; }
+
+ private:
+  friend class Backend;
+  LocalUpdate(std::shared_ptr<const MapSnapshot> map, KeyframeId newest)
+      : map_(std::move(map)), newest_(newest) {}
+
+  std::shared_ptr<const MapSnapshot> map_;
+  KeyframeId newest_;
+  MapSmoother* smoother_ = nullptr;  // or null: bundle adjustment of the keyframe's surroundings
+  LocalBundleOptions local_;
+  BundleResult result_;
+  std::shared_ptr<const KeyframeCovariances> covariances_;
+};
+
+}  // namespace hybrid_slam
