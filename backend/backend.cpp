@@ -28,12 +28,14 @@ PoseConstraint constraint_of(const LoopMeasurement& loop) {
 
 std::vector<PoseConstraint> constraints_of(const std::vector<LoopMeasurement>& loops) {
   std::vector<PoseConstraint> constraints;
+  constraints.reserve(loops.size());
   for (const LoopMeasurement& loop : loops) constraints.push_back(constraint_of(loop));
   return constraints;
 }
 
 std::vector<LoopEnds> ends_of(const std::vector<PoseConstraint>& loops) {
   std::vector<LoopEnds> ends;
+  ends.reserve(loops.size());
   for (const PoseConstraint& loop : loops) ends.emplace_back(loop.a, loop.b);
   return ends;
 }
@@ -128,7 +130,7 @@ void Backend::shift_disparities(CameraId camera, double by, KeyframeId first) {
   smoother_.reset();
 }
 
-BundleSummary Backend::optimize_local(KeyframeId newest, std::stop_token stop) {
+BundleSummary Backend::optimize_local(KeyframeId newest, const std::stop_token& stop) {
   LocalUpdate update = begin_local(newest);
   update.run(stop);
   return end_local(std::move(update));
@@ -155,7 +157,7 @@ void LocalUpdate::run(const std::stop_token& stop) {
 BundleSummary Backend::end_local(LocalUpdate update) {
   updating_ = false;
   carry_newcomers(*update.map_, view(), update.result_);
-  const BundleSummary summary = take_in(std::move(update.result_));
+  BundleSummary summary = take_in(std::move(update.result_));
   if (update.covariances_ != nullptr) map_.set_covariances(std::move(update.covariances_));
   return summary;
 }
@@ -296,7 +298,7 @@ BundleSummary Backend::take_in_full(BundleResult result, std::size_t closings_th
   return take_in(std::move(result));
 }
 
-BundleSummary Backend::optimize_full(std::stop_token stop) {
+BundleSummary Backend::optimize_full(const std::stop_token& stop) {
   return take_in_full(solve_full(view(), options_.full, stop), closings());
 }
 

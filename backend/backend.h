@@ -76,7 +76,7 @@ class Backend {
   // Improves the map after the newest keyframe was added, by the method of the options; outlier
   // observations are erased from the map. Looks at `stop` between iterations and keeps what it has
   // when stopped.
-  BundleSummary optimize_local(KeyframeId newest, std::stop_token stop = {});
+  BundleSummary optimize_local(KeyframeId newest, const std::stop_token& stop = {});
 
   // The same in steps, so that the work can be done beside. Between the two keyframes may be added
   // and edits applied: what came since is carried along. All that moves the map or renumbers
@@ -104,7 +104,7 @@ class Backend {
   BundleSummary take_in_full(BundleResult result, std::size_t closings_then);
 
   // Bundle adjustment of everything but the origin: solve_full and take_in_full.
-  BundleSummary optimize_full(std::stop_token stop = {});
+  BundleSummary optimize_full(const std::stop_token& stop = {});
 
   std::shared_ptr<const MapSnapshot> snapshot();
   const MapSnapshot& view() const { return map_.view(); }

@@ -39,6 +39,7 @@ class EveryFrameCore final : public SlamCore {
   void finish(bool) override {
     mapping_.conclude(tracking_.end());
     publish();
+    observers_.map(map(), MapChange::kEnd);
   }
 
   std::shared_ptr<const MapSnapshot> map() const override { return snapshots_.get(); }

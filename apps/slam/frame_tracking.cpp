@@ -51,9 +51,11 @@ const char* to_string(MapChange change) {
     case MapChange::kLoop:
       return "loop closed";
     case MapChange::kFullBundle:
+      return "all adjusted";
+    case MapChange::kEnd:
       break;
   }
-  return "all adjusted";
+  return "end";
 }
 
 const char* to_string(TrackingState state) {

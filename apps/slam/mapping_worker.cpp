@@ -20,7 +20,8 @@ MappingWorker::MappingWorker(LocalMapping& mapping, const Vocabulary& vocabulary
 void MappingWorker::publish() {
   auto map = reaper_.adopt(mapping_.snapshot());
   places_.follow(*map);
-  snapshots_.publish(reaper_.adopt(std::make_shared<const PublishedMap>(std::move(map), places_)));
+  snapshots_.publish(
+      reaper_.adopt(std::make_shared<const PublishedMap>(PublishedMap{std::move(map), places_})));
 }
 
 void MappingWorker::finish() {

@@ -51,6 +51,7 @@ class RealtimeCore final : public SlamCore {
     if (loops_) end_loops(cancelled);
     local_mapping_.conclude(tracking_.end());
     mapping_.publish();
+    observers_.map(map(), MapChange::kEnd);
   }
 
   std::shared_ptr<const MapSnapshot> map() const override { return mapping_.snapshot(); }

@@ -99,7 +99,12 @@ struct KeyframeResult {
 };
 
 // Why there is another map.
-enum class MapChange { kKeyframe, kLoop, kFullBundle };
+enum class MapChange {
+  kKeyframe,
+  kLoop,
+  kFullBundle,
+  kEnd,  // the last one of a session: all is taken in, the youngest landmarks are judged
+};
 
 const char* to_string(MapChange change);
 

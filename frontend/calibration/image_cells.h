@@ -22,21 +22,25 @@ struct ImageCells {
         rows(std::max(1, static_cast<int>(std::lround(static_cast<double>(kColumns) * height /
                                                       std::max(1, width))))) {}
 
-  std::size_t size() const { return static_cast<std::size_t>(kColumns * rows); }
+  std::size_t size() const {
+    return static_cast<std::size_t>(kColumns) * static_cast<std::size_t>(rows);
+  }
 
   // Of a pixel; of one outside, the nearest.
   std::size_t of(double x, double y) const {
     const auto place = [](double at, int length, int cells) {
       return std::clamp(static_cast<int>((at + 0.5) / length * cells), 0, cells - 1);
     };
-    return static_cast<std::size_t>(place(y, height, rows) * kColumns + place(x, width, kColumns));
+    const int cell = place(y, height, rows) * kColumns + place(x, width, kColumns);
+    return static_cast<std::size_t>(cell);
   }
 
   double center_x(std::size_t cell) const {
     return (static_cast<double>(cell % kColumns) + 0.5) * width / kColumns - 0.5;
   }
   double center_y(std::size_t cell) const {
-    return (static_cast<double>(cell / kColumns) + 0.5) * height / rows - 0.5;
+    const std::size_t row = cell / kColumns;
+    return (static_cast<double>(row) + 0.5) * height / rows - 0.5;
   }
 };
 

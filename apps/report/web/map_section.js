@@ -40,7 +40,7 @@ function mapSection() {
     box.replaceChildren(make(
         'p', {class: 'soft', style: 'padding:1rem'},
         'This browser shows no WebGL: the map cannot be drawn. All other sections are complete; map.png shows the map from above.'));
-  const layers = [], follow = make('input', {type: 'checkbox'});
+  const layers = [], offers = [], follow = make('input', {type: 'checkbox'});
   const hidden = new Set(['error ellipses']);  // what is not ticked
   let factor = 0;
   const paint = () => {
@@ -142,7 +142,7 @@ function mapSection() {
     selection.set(best);
   };
   const toggle = (name, layerNames, there) => {
-    if (!there && !(data.live && name !== 'truth')) return;
+    if (!there() && !data.live) return;
     const input = make('input', {
       type: 'checkbox',
       checked: !hidden.has(name),
@@ -155,7 +155,9 @@ function mapSection() {
         showLegend();
       }
     });
-    controls.append(make('label', {}, input, ' ' + name));
+    const label = make('label', {}, input, ' ' + name);
+    controls.append(label);
+    offers.push(() => { label.hidden = !there(); });  // live, what comes later is offered then
     layers.push(() => layerNames.forEach(layer => scene.show(layer, input.checked)));
   };
   if (scene.gl) {
@@ -166,13 +168,13 @@ function mapSection() {
       controls.append(make('label', {}, 'Landmarks by ', colorBy));
     if (COMPONENTS.length > 1 || data.live) controls.append(make('label', {}, 'Paths by ', pathBy));
     paint();
-    toggle('landmarks', ['landmarks'], data.landmarks.count);
-    toggle('stereo path', ['path0', 'dots0'], frames.count);
-    toggle('fisheye path', ['path1', 'dots1'], frames.camera.includes(1));
-    toggle('keyframes', ['keyframes'], data.keyframes.count);
-    toggle('loops', ['loops'], data.loops.some(loop => loop.outcome === 'accepted'));
-    toggle('truth', ['truth'], data.truth.count);
-    toggle('error ellipses', ['ellipses'], factor > 0);
+    toggle('landmarks', ['landmarks'], () => data.landmarks.count);
+    toggle('stereo path', ['path0', 'dots0'], () => frames.count);
+    toggle('fisheye path', ['path1', 'dots1'], () => frames.camera.includes(1));
+    toggle('keyframes', ['keyframes'], () => data.keyframes.count);
+    toggle('loops', ['loops'], () => data.loops.some(loop => loop.outcome === 'accepted'));
+    toggle('truth', ['truth'], () => data.truth.count);
+    toggle('error ellipses', ['ellipses'], () => factor > 0);
     for (const [name, action, title] of [
              ['fit', () => scene.fit(), 'all of it (F)'],
              ['top', () => scene.look(scene.yaw, 1.5699), 'from above (T)'],
@@ -180,12 +182,14 @@ function mapSection() {
       controls.append(make('button', {type: 'button', click: action, title}, name));
     if (data.live) controls.append(make('label', {}, follow, ' follow the vehicle'));
     layers.forEach(apply => apply());
+    offers.forEach(apply => apply());
     scene.fit();
   }
   mapView.update = () => {
     extent = sceneExtent();
     keyframeSize = 0.025 * extent.size;
     if (scene.gl) paint();
+    offers.forEach(apply => apply());
     if (!scene.touched) {
       scene.target = extent.middle;
       scene.distance = extent.size * 1.15;

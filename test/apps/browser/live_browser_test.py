@@ -98,11 +98,9 @@ def look_at_live(browsers, program, dataset, folder, pictures):
             browser.wait_for("document.documentElement.dataset.live === 'over'")
             check("results are in out" in browser.value("document.getElementById('now-status').textContent"), "where the results are")
             check_frames(browser.value(FRAMES), rows_of(os.path.join(folder, "out", "frames.csv")))
-            # The map at the end is adjusted once more: landmarks may go.
-            off = browser.value("data.keyframes.count") - summary["keyframes"]
-            check(abs(off) <= 1, "keyframes: %d more than in the summary" % off)
-            landmarks = browser.value("data.landmarks.count")
-            check(abs(landmarks - summary["landmarks"]) < 0.02 * summary["landmarks"], "%d landmarks" % landmarks)
+            for what in ("keyframes", "landmarks"):
+                shown = browser.value("data.%s.count" % what)
+                check(shown == summary[what], "%d %s on the page, %d in the summary" % (shown, what, summary[what]))
             print("from a frame's result to the page: median %s ms" % browser.value("document.documentElement.dataset.delayMs"))
             browser.check_quiet(url)
     finally:
