@@ -62,7 +62,7 @@ class Export {
       const fs::path folder = component == largest
                                   ? options_.out
                                   : options_.out / fmt::format("component_{}", component.value);
-      write(component, make_folder(folder));
+      write(component, folder);
       told_.push_back(
           fmt::format("component {}: {} keyframes, to {}", component.value, size, folder.string()));
     }
@@ -72,6 +72,7 @@ class Export {
   }
 
  private:
+  // A folder is made once there is something to write: not where an export is refused.
   void write(KeyframeId component, const fs::path& folder) {
     switch (options_.format) {
       case ExportFormat::kColmap:
@@ -79,7 +80,8 @@ class Export {
         const auto variant = options_.format == ExportFormat::kColmap ? ColmapVariant::kText
                                                                       : ColmapVariant::kBinary;
         ColmapLosses losses;
-        write_colmap(make_colmap_model(map_, component, *names_, variant, losses), folder);
+        const ColmapModel model = make_colmap_model(map_, component, *names_, variant, losses);
+        write_colmap(model, make_folder(folder));
         if (losses.behind > 0) {
           told_.push_back(
               fmt::format("{} observations at 90 degrees or more from a fisheye's axis "
@@ -91,9 +93,9 @@ class Export {
       case ExportFormat::kNerfstudio:
         return export_nerfstudio(map_, component, *names_, options_.out / "images", folder);
       case ExportFormat::kPly:
-        return write_component_ply(map_, component, folder / "map.ply");
+        return write_component_ply(map_, component, make_folder(folder) / "map.ply");
       default:
-        return export_trajectories(map_, component, options_.format, folder);
+        return export_trajectories(map_, component, options_.format, make_folder(folder));
     }
   }
 

@@ -7,6 +7,7 @@
 #include "apps/io/ply.h"
 #include "apps/io/report.h"
 #include "cameras/files/input_error.h"
+#include "cameras/files/output_file.h"
 
 namespace hybrid_slam {
 namespace {
@@ -117,7 +118,7 @@ void export_nerfstudio(const MapSnapshot& map, KeyframeId component, const Image
     if (map.at(map.at(id).reference).component != component) continue;
     points.push_back({map.at(id).point_in_world, {128, 128, 128}});
   }
-  write_ply(folder / "points.ply", points);
+  write_ply(make_folder(folder) / "points.ply", points);
   out.write();
 }
 

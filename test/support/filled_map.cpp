@@ -122,4 +122,16 @@ FilledMap fill_map(const SyntheticScene& scene, const FillOptions& options) {
   return MapFiller(scene, options).fill();
 }
 
+void move_world(Map& map, const Rigid3d& new_from_old) {
+  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
+  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
+  for (const KeyframeId id : map.view().keyframe_ids()) {
+    poses.emplace_back(id, map.view().at(id).cam_from_world * inverse(new_from_old));
+  }
+  for (const LandmarkId id : map.view().landmark_ids()) {
+    points.emplace_back(id, new_from_old * map.view().at(id).point_in_world);
+  }
+  map.move(poses, points);
+}
+
 }  // namespace hybrid_slam

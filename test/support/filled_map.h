@@ -41,4 +41,7 @@ struct FilledMap {
 // Landmarks are born with their first stereo match, or with their second observation.
 FilledMap fill_map(const SyntheticScene& scene, const FillOptions& options);
 
+// Moves the whole map, as a correction would: the world's axes become others.
+void move_world(Map& map, const Rigid3d& new_from_old);
+
 }  // namespace hybrid_slam

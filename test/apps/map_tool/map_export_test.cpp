@@ -233,4 +233,19 @@ TEST_CASE("images are named as the dataset names them", "[data]") {
                     Catch::Contains("no image of time 0.066666667 s, of keyframe 1"));
 }
 
+TEST_CASE("an export that is refused leaves no folder behind") {
+  FilledMap filled = map_of_frames(make_synthetic_scene(small_orbit(4, false)), 0, 4, 1);
+  Calibrated<Bal> bal;
+  bal.width = 640;
+  bal.height = 480;
+  bal.params = {500, 0, 0};
+  filled.map.set_camera(CameraId(0), bal);
+  const TempFolder folder;
+  for (const ExportFormat format : {ExportFormat::kColmap, ExportFormat::kNerfstudio}) {
+    const std::filesystem::path out = folder.path() / "out";
+    CHECK_THROWS_AS(export_map(filled.map.view(), {format, out, {}}), InputError);
+    CHECK_FALSE(std::filesystem::exists(out));
+  }
+}
+
 }  // namespace hybrid_slam

@@ -24,18 +24,6 @@ FilledMap map_of_frames(const SyntheticScene& scene, std::size_t first, std::siz
   return fill_map(part, options);
 }
 
-void move_world(Map& map, const Rigid3d& new_from_old) {
-  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
-  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
-  for (const KeyframeId id : map.view().keyframe_ids()) {
-    poses.emplace_back(id, map.view().at(id).cam_from_world * inverse(new_from_old));
-  }
-  for (const LandmarkId id : map.view().landmark_ids()) {
-    points.emplace_back(id, new_from_old * map.view().at(id).point_in_world);
-  }
-  map.move(poses, points);
-}
-
 MapTables tables_of(Map& map) {
   const auto snapshot = map.snapshot();
   const MapTables& from = MapFileAccess::tables(*snapshot);

@@ -13,9 +13,6 @@ SyntheticSceneOptions small_orbit(int times, bool fisheye);
 FilledMap map_of_frames(const SyntheticScene& scene, std::size_t first, std::size_t last,
                         std::size_t stride);
 
-// The same map in another world.
-void move_world(Map& map, const Rigid3d& new_from_old);
-
 // A map of these tables, right or wrong.
 MapTables tables_of(Map& map);
 

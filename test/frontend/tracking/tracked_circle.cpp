@@ -14,19 +14,6 @@ namespace {
 constexpr double kMaxDistance = 0.003;  // [m]
 constexpr double kMaxAngle = 0.001;     // [rad]
 
-// Moves the whole map, as a correction would: the world's axes become others.
-void move_world(const Rigid3d& new_from_old, Map& map) {
-  std::vector<std::pair<KeyframeId, Rigid3d>> poses;
-  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
-  for (const KeyframeId id : map.view().keyframe_ids()) {
-    poses.emplace_back(id, map.view().at(id).cam_from_world * inverse(new_from_old));
-  }
-  for (const LandmarkId id : map.view().landmark_ids()) {
-    points.emplace_back(id, new_from_old * map.view().at(id).point_in_world);
-  }
-  map.move(poses, points);
-}
-
 }  // namespace
 
 Rigid3d turned(double angle, const Eigen::Vector3d& translation) {
@@ -48,7 +35,7 @@ TrackedCircle::TrackedCircle(std::size_t stride) {
 }
 
 void TrackedCircle::move(const Rigid3d& new_from_old) {
-  move_world(new_from_old, filled.map);
+  move_world(filled.map, new_from_old);
   scene_from_world = scene_from_world * inverse(new_from_old);
 }
 
