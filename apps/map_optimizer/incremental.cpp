@@ -141,11 +141,10 @@ GraphSummary summary_of(const IncrementalRun& run, const FactorGraph& graph) {
       fmt::format("{} of {} frames were taken in", run.updates.size(), graph.frames.size());
   summary.iterations = run.steps;
   const ProblemOptions thresholds;
-  const GraphFactors factors = make_factors(graph);
-  const std::vector<double> chi2 = observations_chi2(graph, factors);
+  const std::vector<double> chi2 = observations_chi2(graph);
   for (std::uint32_t i = 0; i < chi2.size(); ++i) {
     if (!std::isfinite(chi2[i])) summary.unprojectable.push_back(i);
-    const bool stereo = residual_count(factors, i) == 3;
+    const bool stereo = residual_count(graph, graph.observations[i]) == 3;
     if (!(chi2[i] <= (stereo ? thresholds.chi2_stereo : thresholds.chi2_mono))) {
       summary.outliers.push_back(i);
     }

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "apps/pose_graph/block_cholesky.h"
+#include "backend/problem/block_cholesky.h"
 
 namespace hybrid_slam {
 

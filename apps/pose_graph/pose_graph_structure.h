@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "apps/pose_graph/block_cholesky.h"
+#include "backend/problem/block_cholesky.h"
 #include "backend/problem/factor_graph.h"
 
 namespace hybrid_slam {

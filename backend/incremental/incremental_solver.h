@@ -12,11 +12,11 @@
 #include "backend/incremental/incremental_options.h"
 #include "backend/incremental/landmark_term.h"
 #include "backend/incremental/pose_tree.h"
-#include "backend/incremental/robust_loss.h"
 #include "backend/incremental/rows_term.h"
 #include "backend/incremental/world_tangent.h"
 #include "backend/problem/factor_graph.h"
 #include "backend/problem/problem_config.h"
+#include "backend/problem/robust_loss.h"
 
 namespace ceres {
 class CostFunction;

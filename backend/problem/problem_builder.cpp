@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "backend/problem/joint_frame.h"
+#include "backend/problem/observation_chi2.h"
 #include "factors/left_jacobian.h"
 #include "factors/linear_prior.h"
 #include "factors/make_reprojection_factor.h"
@@ -142,8 +143,8 @@ class Builder {
       double* point = graph_.points[observation.point].in_world.data();
       const bool refined = graph_.cameras[frame.camera].refined != 0;
       if (frame.fixed && graph_.points[observation.point].fixed && !refined) continue;
-      SharedLoss& loss = residual_count(factors_, i) == 3 ? stereo : mono;
-      ceres::CostFunction* factor = factors_.observations[i].get();
+      SharedLoss& loss = residual_count(graph_, observation) == 3 ? stereo : mono;
+      ceres::CostFunction* factor = make_observation(observation);
       if (!made_.joint_frames[observation.frame].empty()) {
         made_.joint_factors.push_back(std::make_unique<JointFrameFactor>(*factor));
         problem_->AddResidualBlock(made_.joint_factors.back().get(), loss.get(),
@@ -159,6 +160,16 @@ class Builder {
       }
       if (graph_.points[observation.point].fixed) problem_->SetParameterBlockConstant(point);
     }
+  }
+
+  ceres::CostFunction* make_observation(const GraphObservation& observation) {
+    const GraphCamera& camera = graph_.cameras[graph_.frames[observation.frame].camera];
+    made_.observations.push_back(
+        camera.refined != 0
+            ? make_refining_reprojection_factor(camera.camera, observation.measurement,
+                                                observation.sigma)
+            : make_reprojection_factor(camera.camera, observation.measurement, observation.sigma));
+    return made_.observations.back().get();
   }
 
   template <typename Edge, typename BlockOf>
@@ -302,15 +313,6 @@ double* params_of(Camera& camera) {
 
 GraphFactors make_factors(const FactorGraph& graph) {
   GraphFactors factors;
-  factors.observations.reserve(graph.observations.size());
-  for (const GraphObservation& observation : graph.observations) {
-    const GraphCamera& camera = graph.cameras[graph.frames[observation.frame].camera];
-    factors.observations.push_back(
-        camera.refined != 0
-            ? make_refining_reprojection_factor(camera.camera, observation.measurement,
-                                                observation.sigma)
-            : make_reprojection_factor(camera.camera, observation.measurement, observation.sigma));
-  }
   factors.active.assign(graph.observations.size(), 1);
   factors.edges.reserve(graph.edges.size());
   for (const GraphEdge& edge : graph.edges) {
@@ -334,23 +336,6 @@ GraphFactors make_factors(const FactorGraph& graph) {
   }
   factors.factor_active.assign(graph.factors.size(), 1);
   return factors;
-}
-
-int residual_count(const GraphFactors& factors, std::size_t observation) {
-  return factors.observations[observation]->num_residuals();
-}
-
-std::vector<double> observations_chi2(const FactorGraph& graph, const GraphFactors& factors) {
-  std::vector<double> values(graph.observations.size());
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const GraphObservation& observation = graph.observations[i];
-    const GraphFrame& frame = graph.frames[observation.frame];
-    const double* blocks[] = {frame.cam_from_world.params.data(),
-                              graph.points[observation.point].in_world.data(),
-                              params_of(graph.cameras[frame.camera].camera)};
-    values[i] = squared_norm(*factors.observations[i], blocks);
-  }
-  return values;
 }
 
 std::vector<double> factors_chi2(const FactorGraph& graph, const GraphFactors& factors) {

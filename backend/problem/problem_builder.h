@@ -13,15 +13,15 @@ class Problem;
 
 namespace hybrid_slam {
 
-// The terms of a graph as functions that Ceres can evaluate, one for each element of the graph's
-// vectors of the same names. They hold the measurements but not the estimate.
+// The terms of a graph but its observations as functions that Ceres can evaluate, one for each
+// element of the graph's vectors of the same names. They hold the measurements but not the
+// estimate.
 struct GraphFactors {
   GraphFactors();
   GraphFactors(GraphFactors&&) noexcept;
   GraphFactors& operator=(GraphFactors&&) noexcept;
   ~GraphFactors();
 
-  std::vector<std::unique_ptr<ceres::CostFunction>> observations;
   std::vector<std::unique_ptr<ceres::CostFunction>> edges;
   std::vector<std::unique_ptr<ceres::CostFunction>> priors;
   std::vector<std::unique_ptr<ceres::CostFunction>> similarity_edges;
@@ -33,18 +33,12 @@ struct GraphFactors {
 // Requires a valid graph. All observations are active.
 GraphFactors make_factors(const FactorGraph& graph);
 
-// Squared whitened residuals at the present estimate, per observation; infinite where the point
-// does not project.
-std::vector<double> observations_chi2(const FactorGraph& graph, const GraphFactors& factors);
-
-// The same of the factors of any kind; infinite where a function fails.
+// Squared residuals of the factors of any kind, at the present estimate; infinite where a function
+// fails.
 std::vector<double> factors_chi2(const FactorGraph& graph, const GraphFactors& factors);
 
 // Of all edges of both kinds and all priors together.
 double edges_chi2(const FactorGraph& graph, const GraphFactors& factors);
-
-// Rows of the residual of an observation: 3 of a stereo measurement, else 2.
-int residual_count(const GraphFactors& factors, std::size_t observation);
 
 // A graph as Ceres solves it: on the values of the graph, but for frames that have a refined camera
 // for themselves, which are joint blocks (backend/problem/joint_frame.h) kept here.
@@ -54,6 +48,7 @@ struct CeresGraph {
   ~CeresGraph();
 
   std::vector<std::vector<double>> joint_frames;  // as graph.frames; empty where separate
+  std::vector<std::unique_ptr<ceres::CostFunction>> observations;  // active ones
   std::vector<std::unique_ptr<ceres::CostFunction>> joint_factors;
   std::unique_ptr<ceres::Problem> problem;
 

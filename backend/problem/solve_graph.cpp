@@ -39,10 +39,10 @@ void write_kept_costs(const GraphFactors& factors, const std::vector<double>& be
 }
 
 // Observations beyond their threshold at the present estimate are set aside, others taken back.
-void test_outliers(const ProblemOptions& options, const std::vector<double>& values,
-                   GraphFactors& factors) {
+void test_outliers(const FactorGraph& graph, const ProblemOptions& options,
+                   const std::vector<double>& values, GraphFactors& factors) {
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const bool stereo = residual_count(factors, i) == 3;
+    const bool stereo = residual_count(graph, graph.observations[i]) == 3;
     factors.active[i] = values[i] <= (stereo ? options.chi2_stereo : options.chi2_mono);
   }
 }
@@ -60,7 +60,7 @@ void run_rounds(FactorGraph& graph, const ProblemOptions& options, const std::st
                 const std::function<void(const IterationReport&)>& progress, GraphFactors& factors,
                 GraphSummary& summary) {
   for (std::size_t i = 0; i < options.rounds.size(); ++i) {
-    if (i > 0) test_outliers(options, observations_chi2(graph, factors), factors);
+    if (i > 0) test_outliers(graph, options, observations_chi2(graph), factors);
     const auto report = [&](IterationReport iteration) {
       iteration.round = static_cast<int>(i);
       progress(iteration);
@@ -131,7 +131,7 @@ GraphSummary solve_graph(FactorGraph& graph, const ProblemOptions& options,
   require(options.validate(), "ProblemOptions: ");
   require(graph.validate(), "FactorGraph: ");
   GraphFactors factors = make_factors(graph);
-  const std::vector<double> before = observations_chi2(graph, factors);
+  const std::vector<double> before = observations_chi2(graph);
   for (std::size_t i = 0; i < before.size(); ++i) factors.active[i] = std::isfinite(before[i]);
 
   GraphSummary summary;
@@ -145,25 +145,14 @@ GraphSummary solve_graph(FactorGraph& graph, const ProblemOptions& options,
   const Estimate estimate(graph);
   run_rounds(graph, options, stop, progress, factors, summary);
   if (summary.end == SolveEnd::kFailed) estimate.restore(graph);
-  const std::vector<double> after = observations_chi2(graph, factors);
+  const std::vector<double> after = observations_chi2(graph);
   const double edges_after = others_chi2(graph, factors);
   summary.final_cost = half_sum(after, edges_after);
-  test_outliers(options, after, factors);
+  test_outliers(graph, options, after, factors);
   write_kept_costs(factors, before, after, edges_before, edges_after, summary);
   summary.outliers = inactive(factors);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
-}
-
-double chi2(const FactorGraph& graph, const GraphObservation& observation) {
-  FactorGraph single;
-  single.cameras = {graph.cameras[graph.frames[observation.frame].camera]};
-  single.frames = {graph.frames[observation.frame]};
-  single.frames[0].camera = 0;
-  single.points = {graph.points[observation.point]};
-  single.observations = {observation};
-  single.observations[0].frame = single.observations[0].point = 0;
-  return observations_chi2(single, make_factors(single))[0];
 }
 
 double chi2(const FactorGraph& graph, const GraphEdge& edge) {
@@ -177,7 +166,7 @@ double chi2(const FactorGraph& graph, const GraphEdge& edge) {
 
 double cost(const FactorGraph& graph) {
   const GraphFactors factors = make_factors(graph);
-  return half_sum(observations_chi2(graph, factors), others_chi2(graph, factors));
+  return half_sum(observations_chi2(graph), others_chi2(graph, factors));
 }
 
 }  // namespace hybrid_slam

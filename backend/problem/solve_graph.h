@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "backend/problem/factor_graph.h"
+#include "backend/problem/observation_chi2.h"
 #include "backend/problem/problem_config.h"
 
 namespace hybrid_slam {
@@ -47,8 +48,7 @@ GraphSummary solve_graph(FactorGraph& graph, const ProblemOptions& options,
                          const std::stop_token& stop = {},
                          const std::function<void(const IterationReport&)>& progress = {});
 
-// Squared whitened residual of one term; infinite if its point does not project.
-double chi2(const FactorGraph& graph, const GraphObservation& observation);
+// Squared whitened residual of an edge; that of an observation: observation_chi2.h.
 double chi2(const FactorGraph& graph, const GraphEdge& edge);
 
 // Half the sum of squares of all observations that project, all edges, priors and factors.

@@ -1,4 +1,4 @@
-#include "apps/pose_graph/block_cholesky.h"
+#include "backend/problem/block_cholesky.h"
 
 #include <Eigen/Cholesky>
 

@@ -1,4 +1,4 @@
-#include "apps/pose_graph/block_cholesky.h"
+#include "backend/problem/block_cholesky.h"
 
 #include <algorithm>
 
@@ -65,11 +65,15 @@ BlockPattern::BlockPattern(const std::vector<Coupling>& couplings, const std::ve
   for (std::size_t e = 0; e < couplings.size(); ++e) {
     Slot& slot = slots_[e];
     if (slot.column == kNone) continue;
-    const int row_below = std::max(row(couplings[e].first), row(couplings[e].second));
-    const auto begin = rows_.begin() + column_begin(slot.column);
-    const auto end = rows_.begin() + column_begin(slot.column + 1);
-    slot.position = static_cast<int>(std::lower_bound(begin, end, row_below) - begin);
+    slot.position =
+        position(slot.column, std::max(row(couplings[e].first), row(couplings[e].second)));
   }
+}
+
+int BlockPattern::position(int column, int row) const {
+  const auto begin = rows_.begin() + column_begin(column);
+  const auto end = rows_.begin() + column_begin(column + 1);
+  return static_cast<int>(std::lower_bound(begin, end, row) - begin);
 }
 
 template <int kSize>

@@ -25,6 +25,8 @@ class BlockPattern {
     bool swapped = false;  // the coupling's first node has the column, its second one the row
   };
 
+  BlockPattern() = default;  // of no nodes
+
   // known: nodes without a row. Couplings may repeat: they share their block.
   BlockPattern(const std::vector<Coupling>& couplings, const std::vector<char>& known);
 
@@ -37,11 +39,13 @@ class BlockPattern {
   int row_at(int column, int position) const {
     return rows_[static_cast<std::size_t>(column_begin(column) + position)];
   }
+  // Where a row is in a column, which must have it.
+  int position(int column, int row) const;
 
  private:
   std::vector<int> row_of_;
-  std::vector<int> column_begin_;  // into rows_
-  std::vector<int> rows_;          // ascending in each column, which begins with its diagonal
+  std::vector<int> column_begin_{0};  // into rows_
+  std::vector<int> rows_;             // ascending in each column, which begins with its diagonal
   std::vector<Slot> slots_;
 };
 
@@ -64,6 +68,13 @@ class BlockMatrix {
       at(slot.column, slot.position) += block;
     }
   }
+  // The same as numbers: a block of the lower triangle begins at offset() in values(), its columns
+  // stride() apart.
+  double* values() { return lower_.valuePtr(); }
+  Eigen::Index offset(int column, int position) const {
+    return kSize * (Eigen::Index{kSize} * pattern_.column_begin(column) + position);
+  }
+  Eigen::Index stride(int column) const { return kSize * pattern_.column_size(column); }
   Eigen::VectorXd operator*(const Eigen::VectorXd& x) const;
 
   // Lower triangle; of the blocks on the diagonal the upper part is there too.
@@ -73,17 +84,13 @@ class BlockMatrix {
   using BlockMap = Eigen::Map<Block, 0, Eigen::OuterStride<>>;
   using ConstBlockMap = Eigen::Map<const Block, 0, Eigen::OuterStride<>>;
 
-  Eigen::Index offset(int column, int position) const {
-    return kSize * (Eigen::Index{kSize} * pattern_.column_begin(column) + position);
-  }
-  Eigen::OuterStride<> stride(int column) const {
-    return Eigen::OuterStride<>(kSize * pattern_.column_size(column));
-  }
   BlockMap at(int column, int position) {
-    return BlockMap(lower_.valuePtr() + offset(column, position), stride(column));
+    return BlockMap(lower_.valuePtr() + offset(column, position),
+                    Eigen::OuterStride<>(stride(column)));
   }
   ConstBlockMap at(int column, int position) const {
-    return ConstBlockMap(lower_.valuePtr() + offset(column, position), stride(column));
+    return ConstBlockMap(lower_.valuePtr() + offset(column, position),
+                         Eigen::OuterStride<>(stride(column)));
   }
 
   const BlockPattern& pattern_;
