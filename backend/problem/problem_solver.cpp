@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "backend/problem/bundle_solver.h"
 #include "backend/problem/openmp_threads.h"
 
 namespace hybrid_slam {
@@ -69,11 +70,15 @@ bool is_finite(const FactorGraph& graph) {
                      [](const auto& block) { return block.values.allFinite(); });
 }
 
+std::size_t varying_frames(const FactorGraph& graph) {
+  return static_cast<std::size_t>(std::count_if(graph.frames.begin(), graph.frames.end(),
+                                                [](const auto& frame) { return !frame.fixed; }));
+}
+
 ceres::LinearSolverType linear_solver_of(const FactorGraph& graph, LinearSolver wanted) {
   const bool bundle = !graph.points.empty();
   if (wanted == LinearSolver::kAuto) {
-    const auto frames = static_cast<std::size_t>(std::count_if(
-        graph.frames.begin(), graph.frames.end(), [](const auto& frame) { return !frame.fixed; }));
+    const std::size_t frames = varying_frames(graph);
     wanted = LinearSolver::kSparse;
     if (bundle && frames <= kMaxDenseFrames) wanted = LinearSolver::kDense;
     if (bundle && frames >= kMinIterativeFrames) wanted = LinearSolver::kIterative;
@@ -122,26 +127,14 @@ SolveEnd end_of(const ceres::Solver::Summary& summary, const ProblemOptions& opt
   }
 }
 
-}  // namespace
-
-SolveOutcome solve_round(FactorGraph& graph, const GraphFactors& factors,
-                         const ProblemOptions& options, const SolveRound& round,
-                         const std::stop_token& stop,
-                         const std::function<void(const IterationReport&)>& progress) {
+SolveOutcome solve_with_ceres(FactorGraph& graph, const GraphFactors& factors,
+                              const ProblemOptions& options, const SolveRound& round,
+                              const std::stop_token& stop,
+                              const std::function<void(const IterationReport&)>& progress) {
   SolveOutcome outcome;
-  if (stop.stop_requested()) {
-    outcome.end = SolveEnd::kStopped;
-    outcome.text = "stopped before the first iteration";
-    return outcome;
-  }
-  if (!is_finite(graph)) {
-    outcome.end = SolveEnd::kFailed;
-    outcome.text = "initial values are not finite";
-    return outcome;
-  }
   CeresGraph built = build_ceres_problem(graph, factors, options, round.loss);
   if (built.problem->NumResidualBlocks() == 0) {
-    outcome.text = "nothing varies, or nothing was observed";
+    outcome.text = kNothingVaries;
     return outcome;
   }
   ceres::Solver::Options solver = solver_options(graph, built, options, round);
@@ -159,6 +152,30 @@ SolveOutcome solve_round(FactorGraph& graph, const GraphFactors& factors,
   outcome.residual_seconds = summary.residual_evaluation_time_in_seconds;
   outcome.jacobian_seconds = summary.jacobian_evaluation_time_in_seconds;
   outcome.linear_solver_seconds = summary.linear_solver_time_in_seconds;
+  return outcome;
+}
+
+}  // namespace
+
+SolveOutcome solve_round(FactorGraph& graph, const GraphFactors& factors,
+                         const ProblemOptions& options, const SolveRound& round,
+                         const std::stop_token& stop,
+                         const std::function<void(const IterationReport&)>& progress) {
+  SolveOutcome outcome;
+  if (stop.stop_requested()) {
+    outcome.end = SolveEnd::kStopped;
+    outcome.text = "stopped before the first iteration";
+    return outcome;
+  }
+  if (!is_finite(graph)) {
+    outcome.end = SolveEnd::kFailed;
+    outcome.text = "initial values are not finite";
+    return outcome;
+  }
+  const bool plain = options.linear_solver == LinearSolver::kAuto && is_plain_bundle(graph) &&
+                     varying_frames(graph) < kMinIterativeFrames;
+  outcome = plain ? solve_bundle_round(graph, factors, options, round, stop, progress)
+                  : solve_with_ceres(graph, factors, options, round, stop, progress);
   if (outcome.end != SolveEnd::kFailed && !is_finite(graph)) {
     outcome.end = SolveEnd::kFailed;
     outcome.text = "the solution is not finite";

@@ -19,8 +19,13 @@ struct SolveOutcome {
   double linear_solver_seconds = 0;
 };
 
-// Runs one round on the active terms and moves the estimate of `graph`: Ceres, trust region,
-// landmarks eliminated first (Schur), the reduced system dense, sparse or iterative by its size.
+// The text of SolveEnd::kEmpty.
+constexpr const char* kNothingVaries = "nothing varies, or nothing was observed";
+
+// Runs one round on the active terms and moves the estimate of `graph`: trust region, landmarks
+// eliminated first (Schur). A bundle adjustment with known cameras is solved by bundle_solver.h if
+// the linear solver is kAuto; all else by Ceres, the reduced system dense, sparse or iterative by
+// its size.
 // Looks at `stop` after each iteration and keeps what it has. After kFailed the estimate is
 // worthless: the caller drops it.
 SolveOutcome solve_round(FactorGraph& graph, const GraphFactors& factors,
