@@ -19,17 +19,18 @@ double damping(double diagonal, double unit, double radius) {
   return std::clamp(diagonal / unit, kLeastDiagonal, kMostDiagonal) * unit / radius;
 }
 
-// block -= a b^T of panels with six rows; the columns of the block are `stride` apart.
+// block -= a b^T of panels with six rows and at least one column; the columns of the block are
+// `stride` apart.
 void subtract_product(const double* a, const double* b, std::uint32_t columns, double* block,
                       Eigen::Index stride) {
   using Half = Eigen::Matrix<double, 6, 3>;
   for (int half = 0; half < 2; ++half) {  // as much as registers hold
-    Half sum = Half::Zero();
-    for (std::uint32_t k = 0; k < columns; ++k) {
-      const Eigen::Map<const Vector6d> left(a + 6 * k);
-      const Eigen::Map<const Eigen::Vector3d> right(b + 6 * k + 3 * half);
-      sum.noalias() += left * right.transpose();
-    }
+    const auto product = [&](std::uint32_t k) {
+      return Eigen::Map<const Vector6d>(a + 6 * k).lazyProduct(
+          Eigen::Map<const Eigen::RowVector3d>(b + 6 * k + 3 * half));
+    };
+    Half sum = product(0);
+    for (std::uint32_t k = 1; k < columns; ++k) sum += product(k);
     Eigen::Map<Half, 0, Eigen::OuterStride<>>(block + 3 * half * stride,
                                               Eigen::OuterStride<>(stride)) -= sum;
   }

@@ -71,9 +71,10 @@ class BundleEquations {
   double edges_cost(const BundleEstimate& at) const;
   double linearize_edges(const BundleEstimate& at);
   double linearize_point(std::uint32_t p, const BundleEstimate& at);
+  // again: the term before was of the same view.
   template <int kRows>
-  double add_term(const BundleTerm& term, std::uint32_t p, double* residual, double* by_pose,
-                  double* by_point);
+  double add_term(const BundleTerm& term, std::uint32_t p, bool again, double* residual,
+                  double* by_pose, double* by_point);
 
   void find_blocks();
   bool eliminate_points(double radius);

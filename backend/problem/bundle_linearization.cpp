@@ -83,7 +83,6 @@ double BundleEquations::edges_cost(const BundleEstimate& at) const {
 double BundleEquations::linearize(const BundleEstimate& at) {
   for (Matrix6d& information : pose_information_) information.setZero();
   pose_gradient_.setZero();
-  for (Block63& cross : cross_) cross.setZero();
   double sum = linearize_edges(at);
   for (std::uint32_t p = 0; p < structure_.points.size(); ++p) sum += linearize_point(p, at);
   return finite(sum);
@@ -126,18 +125,23 @@ double BundleEquations::linearize_point(std::uint32_t p, const BundleEstimate& a
     point_gradient_.segment<3>(3 * Eigen::Index{p}).setZero();
   }
   double sum = 0;
+  std::uint32_t view = BundleTerm::kNoView;
   for (std::uint32_t i = structure_.first_terms[p]; i < structure_.first_terms[p + 1]; ++i) {
     const BundleTerm& term = structure_.terms[i];
     if (!evaluate_term(graph_, term, at, p, residual, by_pose, by_point)) return kInfinity;
-    sum += std::isnan(term.measurement[2]) ? add_term<2>(term, p, residual, by_pose, by_point)
-                                           : add_term<3>(term, p, residual, by_pose, by_point);
+    const bool again = term.view == view;
+    view = term.view;
+    sum += std::isnan(term.measurement[2])
+               ? add_term<2>(term, p, again, residual, by_pose, by_point)
+               : add_term<3>(term, p, again, residual, by_pose, by_point);
   }
   return sum;
 }
 
 template <int kRows>
-double BundleEquations::add_term(const BundleTerm& term, std::uint32_t p, double* residual_data,
-                                 double* by_pose_data, double* by_point_data) {
+double BundleEquations::add_term(const BundleTerm& term, std::uint32_t p, bool again,
+                                 double* residual_data, double* by_pose_data,
+                                 double* by_point_data) {
   Eigen::Map<Eigen::Matrix<double, kRows, 1>> residual(residual_data);
   Eigen::Map<Eigen::Matrix<double, kRows, kPoseStride, Eigen::RowMajor>> padded(by_pose_data);
   Eigen::Map<Eigen::Matrix<double, kRows, 3, Eigen::RowMajor>> by_point(by_point_data);
@@ -160,8 +164,11 @@ double BundleEquations::add_term(const BundleTerm& term, std::uint32_t p, double
     point_information_[p].noalias() += by_point.transpose() * by_point;
     point_gradient_.segment<3>(3 * Eigen::Index{p}).noalias() += by_point.transpose() * residual;
   }
-  if (term.view != BundleTerm::kNoView) {
+  if (term.view == BundleTerm::kNoView) return loss.cost(square) / 2;
+  if (again) {
     cross_[term.view].noalias() += by_pose.transpose() * by_point;
+  } else {
+    cross_[term.view].noalias() = by_pose.transpose() * by_point;
   }
   return loss.cost(square) / 2;
 }

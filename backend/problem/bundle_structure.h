@@ -47,7 +47,7 @@ struct BundleStructure {
   std::vector<std::uint32_t> points;       // of the graph: those that vary, then known ones
   std::uint32_t varying_points = 0;        // how many of them
   std::vector<std::uint32_t> first_terms;  // per point, and the number of all
-  std::vector<BundleTerm> terms;
+  std::vector<BundleTerm> terms;           // of each point by row: those of a view side by side
   std::vector<BundleGroup> groups;
   std::vector<int> group_rows;  // ascending in each group
   std::uint32_t view_count = 0;
