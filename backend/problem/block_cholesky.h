@@ -37,7 +37,8 @@ class BlockPattern {
   int column_begin(int column) const { return column_begin_[static_cast<std::size_t>(column)]; }
   int column_size(int column) const { return column_begin(column + 1) - column_begin(column); }
   int row_at(int column, int position) const {
-    return rows_[static_cast<std::size_t>(column_begin(column) + position)];
+    return rows_[static_cast<std::size_t>(column_begin(column)) +
+                 static_cast<std::size_t>(position)];
   }
   // Where a row is in a column, which must have it.
   int position(int column, int row) const;
@@ -74,7 +75,9 @@ class BlockMatrix {
   Eigen::Index offset(int column, int position) const {
     return kSize * (Eigen::Index{kSize} * pattern_.column_begin(column) + position);
   }
-  Eigen::Index stride(int column) const { return kSize * pattern_.column_size(column); }
+  Eigen::Index stride(int column) const {
+    return Eigen::Index{kSize} * pattern_.column_size(column);
+  }
   Eigen::VectorXd operator*(const Eigen::VectorXd& x) const;
 
   // Lower triangle; of the blocks on the diagonal the upper part is there too.

@@ -21,16 +21,16 @@ double damping(double diagonal, double unit, double radius) {
 
 // block -= a b^T of panels with six rows and at least one column; the columns of the block are
 // `stride` apart.
-void subtract_product(const double* a, const double* b, std::uint32_t columns, double* block,
+void subtract_product(const double* a, const double* b, Eigen::Index columns, double* block,
                       Eigen::Index stride) {
   using Half = Eigen::Matrix<double, 6, 3>;
-  for (int half = 0; half < 2; ++half) {  // as much as registers hold
-    const auto product = [&](std::uint32_t k) {
+  for (Eigen::Index half = 0; half < 2; ++half) {  // as much as registers hold
+    const auto product = [&](Eigen::Index k) {
       return Eigen::Map<const Vector6d>(a + 6 * k).lazyProduct(
           Eigen::Map<const Eigen::RowVector3d>(b + 6 * k + 3 * half));
     };
     Half sum = product(0);
-    for (std::uint32_t k = 1; k < columns; ++k) sum += product(k);
+    for (Eigen::Index k = 1; k < columns; ++k) sum += product(k);
     Eigen::Map<Half, 0, Eigen::OuterStride<>>(block + 3 * half * stride,
                                               Eigen::OuterStride<>(stride)) -= sum;
   }
@@ -133,16 +133,16 @@ bool BundleEquations::eliminate_group(std::size_t index, double radius) {
       if (!halve(p, radius)) return false;
       const Eigen::Vector3d halved = halves_[p] * point_gradient_.segment<3>(3 * Eigen::Index{p});
       for (std::uint32_t k = 0; k < group.row_count(); ++k) {
-        Eigen::Map<Block63> u(panels_.data() + std::size_t{kPanel} * k + 18 * n);
+        Eigen::Map<Block63> u(panels_.data() + std::size_t{kPanel} * k + std::size_t{18} * n);
         u.noalias() = cross_[group.view(p, k)] * halves_[p].transpose();
-        reduced_right_.segment<6>(6 * rows[k]).noalias() += u * halved;
+        reduced_right_.segment<6>(6 * Eigen::Index{rows[k]}).noalias() += u * halved;
       }
     }
     const Eigen::Index* block = blocks_.data() + first_blocks_[index];
     for (std::uint32_t i = 0; i < group.row_count(); ++i) {
       for (std::uint32_t j = 0; j <= i; ++j) {
         subtract_product(panels_.data() + std::size_t{kPanel} * i,
-                         panels_.data() + std::size_t{kPanel} * j, 3 * count,
+                         panels_.data() + std::size_t{kPanel} * j, 3 * Eigen::Index{count},
                          reduced_.values() + *block++, reduced_.stride(rows[j]));
       }
     }
@@ -167,7 +167,8 @@ void BundleEquations::solve_points(const Eigen::VectorXd& poses, Eigen::VectorXd
     for (std::uint32_t p = group.first_point; p < group.end_point; ++p) {
       Eigen::Vector3d right = point_gradient_.segment<3>(3 * Eigen::Index{p});
       for (std::uint32_t k = 0; k < group.row_count(); ++k) {
-        right.noalias() += cross_[group.view(p, k)].transpose() * poses.segment<6>(6 * rows[k]);
+        right.noalias() +=
+            cross_[group.view(p, k)].transpose() * poses.segment<6>(6 * Eigen::Index{rows[k]});
       }
       const Eigen::Vector3d halved = halves_[p] * right;
       points.segment<3>(3 * Eigen::Index{p}).noalias() = -halves_[p].transpose() * halved;

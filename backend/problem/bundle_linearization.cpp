@@ -107,7 +107,7 @@ double BundleEquations::linearize_edges(const BundleEstimate& at) {
     const auto add = [&](int row, const Matrix6d& jacobian) {
       if (row == BlockPattern::kNone) return;
       pose_information_[static_cast<std::size_t>(row)].noalias() += jacobian.transpose() * jacobian;
-      pose_gradient_.segment<6>(6 * row).noalias() += jacobian.transpose() * residual;
+      pose_gradient_.segment<6>(6 * Eigen::Index{row}).noalias() += jacobian.transpose() * residual;
     };
     add(block.row_a, a);
     add(block.row_b, b);

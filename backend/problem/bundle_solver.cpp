@@ -197,7 +197,7 @@ class BundleMinimizer {
   }
 
   void move(const Eigen::VectorXd& poses, const Eigen::VectorXd& points, BundleEstimate& to) const {
-    for (int row = 0; row < structure_.rows(); ++row) {
+    for (Eigen::Index row = 0; row < structure_.rows(); ++row) {
       const std::uint32_t frame = structure_.frames[static_cast<std::size_t>(row)];
       to.cam_from_world[frame] = se3_exp(poses.segment<6>(6 * row)) * now_.cam_from_world[frame];
     }

@@ -21,8 +21,9 @@ struct SolveRound {
   double function_tolerance = 1e-6;  // ends below this relative decrease of the cost
 };
 
+// All but kAuto: Ceres with this one.
 enum class LinearSolver {
-  kAuto,       // by the problem's size: see problem_solver.cpp
+  kAuto,       // the bundle solver where it has the equations; else by size: problem_solver.cpp
   kDense,      // Schur complement, dense
   kSparse,     // Schur complement or, without landmarks, normal equations; sparse
   kIterative,  // Schur complement by conjugate gradients, never formed
@@ -38,7 +39,7 @@ struct ProblemOptions {
   double trust_region = 1e4;  // radius at the start: large is nearly Gauss-Newton
   // 0 for none. Ends a round after the iteration in which it passes; gives up repeatability.
   double max_seconds = 0;
-  int threads = 1;  // inside the solver; more than 1 gives up repeatability
+  int threads = 1;  // inside Ceres, not the bundle solver; more than 1 gives up repeatability
 
   // Empty if the values can be used, else what is wrong.
   std::string validate() const;
