@@ -29,8 +29,15 @@ class OdometryChain {
     }
   }
 
-  // What the present frame takes along as a keyframe; null where the chain is broken. `previous`:
-  // the keyframe that it began with.
+  // The same, of a motion that another than the odometer knows: nothing was followed, and a present
+  // frame that becomes a keyframe has what it knows in its landmarks.
+  void bridge(const UncertainMotion& motion) {
+    if (since_) since_ = motion * *since_;
+    last_.reset();
+  }
+
+  // What the present frame takes along as a keyframe; null where the chain is broken or
+  // was bridged to this frame. `previous`: the keyframe that it began with.
   std::shared_ptr<const Odometry> odometry(KeyframeId previous) const;
 
  private:

@@ -27,6 +27,15 @@ std::vector<LandmarkPrediction> without(const std::vector<LandmarkPrediction>& p
   return open;
 }
 
+// At the border of the image a landmark can be seen that was expected just outside.
+void count_found_as_visible(SeenLandmarks& counts) {
+  std::vector<LandmarkId> expected = counts.visible;
+  std::sort(expected.begin(), expected.end());
+  for (const LandmarkId id : counts.found) {
+    if (!std::binary_search(expected.begin(), expected.end(), id)) counts.visible.push_back(id);
+  }
+}
+
 }  // namespace
 
 std::string TrackerOptions::validate() const {
@@ -171,6 +180,7 @@ std::optional<MapMatcher::LocalMapMatch> MapMatcher::match_local_map(
   const std::vector<float> u_right = frame.features.u_right;
   if (refiner_.refine(map, frame) > 0) match.support = refine(map, match.search, frame);
   match.counts.found = valid_ids(frame.landmarks);
+  count_found_as_visible(match.counts);
   if (!is_believed(match.support)) {
     frame.features.left.keypoints = keypoints;
     frame.features.u_right = u_right;

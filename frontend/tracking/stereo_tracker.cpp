@@ -149,7 +149,7 @@ void StereoTracker::track_onwards(Frame& frame, const MapSnapshot& map, TrackedF
   const bool agreed =
       step && step->believed &&
       (!match || agrees(step->motion, predicted, frame.cam_from_world, match->support.covariance));
-  if (match || agreed) chain_.add(agreed ? std::optional(step->motion) : std::nullopt);
+  const std::optional<UncertainPose> last = uncertain_;
   if (match) {
     result.source = PoseSource::kLocalMap;
     result.reference = match->reference;
@@ -175,6 +175,7 @@ void StereoTracker::track_onwards(Frame& frame, const MapSnapshot& map, TrackedF
     uncertain_ = moved(*uncertain_, {step->motion.current_from_previous, step->motion.covariance},
                        frame.index);
   }
+  if (match || agreed) lengthen_chain(map, frame, predicted, step, agreed, last);
 }
 
 // Where the map and a motion that is believed say different things, one of them is wrong. The map
@@ -203,9 +204,10 @@ void StereoTracker::relocalize(Frame& frame, const MapSnapshot& map, TrackedFram
   result.inliers = match->support.inliers;
   result.counts = std::move(match->counts);
   depth_ = match->support.depth;
-  chain_.add(std::nullopt);
+  const std::optional<UncertainPose> last = uncertain_;
   uncertain_ =
       hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference, options_.pose);
+  bridge_chain(map, last);
 }
 
 // Goes on by itself: by the motion since a frame after the last good one, or at constant velocity.

@@ -101,6 +101,10 @@ class StereoTracker {
   bool track_last_frame(Frame& frame, const MapSnapshot& map, TrackedFrame& result) const;
   bool track_keyframes(Frame& frame, const MapSnapshot& map) const;
   std::optional<MapMatcher::LocalMapMatch> track_local_map(Frame& frame, const MapSnapshot& map);
+  void lengthen_chain(const MapSnapshot& map, const Frame& frame, const Rigid3d& predicted,
+                      const std::optional<LadderStep>& step, bool agreed,
+                      const std::optional<UncertainPose>& last);
+  void bridge_chain(const MapSnapshot& map, const std::optional<UncertainPose>& last);
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
   NewKeyframe make_keyframe(const Frame& frame, const MapSnapshot& map, KeyframeId reference) const;
   void learn_moving(const LadderStep& step, const Frame& frame);

@@ -5,6 +5,10 @@
 #include <utility>
 #include <variant>
 
+#include <Eigen/Cholesky>
+
+#include "cameras/geometry/se3.h"
+#include "cameras/geometry/uncertain_motion.h"
 #include "frontend/tracking/stereo_keyframe.h"
 #include "frontend/tracking/stereo_tracker.h"
 
@@ -59,6 +63,41 @@ void StereoTracker::begin_component(Frame& frame, const MapSnapshot& map, Tracke
                      odometry.motion, frame.index);
   depth_ = coverage->median_depth;
   result.keyframe->odometry = std::make_shared<const Odometry>(std::move(odometry));
+}
+
+// The odometer's motion, wherever it gave one. Where the map says something else one of the two is
+// wrong, or the last frame was: the map jumps where known ground comes back into view. Then the
+// motion counts as off by as much as that. Where it gave none the map's does, so that there is no
+// keyframe that nothing holds: the map may not reach the next one.
+void StereoTracker::lengthen_chain(const MapSnapshot& map, const Frame& frame,
+                                   const Rigid3d& predicted, const std::optional<LadderStep>& step,
+                                   bool agreed, const std::optional<UncertainPose>& last) {
+  if (!step || !step->believed) {
+    bridge_chain(map, last);
+    return;
+  }
+  StereoMotion motion = step->motion;
+  if (!agreed) {
+    const Vector6d off = se3_log(frame.cam_from_world * inverse(predicted));
+    motion.covariance += off * off.transpose();
+  }
+  chain_.add(motion);
+}
+
+// From the frame `last` to the present one, by the map. Between components nothing is known.
+void StereoTracker::bridge_chain(const MapSnapshot& map, const std::optional<UncertainPose>& last) {
+  const Keyframe* const before = last ? map.find(last->reference) : nullptr;
+  const Keyframe* const now = map.find(uncertain_->reference);
+  if (before == nullptr || now == nullptr || before->component != now->component) {
+    chain_.add(std::nullopt);
+    return;
+  }
+  const UncertainMotion motion = relative_pose(map, *uncertain_, *last);
+  if (motion.covariance.llt().info() == Eigen::Success) {
+    chain_.bridge(motion);
+  } else {
+    chain_.add(std::nullopt);
+  }
 }
 
 void StereoTracker::learn_moving(const LadderStep& step, const Frame& frame) {

@@ -149,6 +149,28 @@ TEST_CASE("A keyframe by odometry takes nothing along of a pose that was rejecte
   }
 }
 
+void forget_landmarks(TrackedCircle& world) {
+  MapEdit edit;
+  edit.erased_landmarks = world.map().landmark_ids();
+  world.filled.map.apply(edit);
+}
+
+// The keyframe that `after` became is held by the one that `made` became, to `sigma` [m], and by
+// what is true.
+void check_odometry(const TrackedCircle& world, const TrackedFrame& made, const TrackedFrame& after,
+                    KeyframeId before, double sigma) {
+  CHECK(after.source == PoseSource::kOdometer);
+  REQUIRE(after.keyframe);
+  REQUIRE(after.keyframe->odometry != nullptr);
+  const Odometry& odometry = *after.keyframe->odometry;
+  CHECK(odometry.previous == before);
+  const Rigid3d truth = world.true_pose(static_cast<std::size_t>(after.frame_index)) *
+                        inverse(world.true_pose(static_cast<std::size_t>(made.frame_index)));
+  const Vector6d off = se3_log(odometry.motion.b_from_a * inverse(truth));
+  CHECK(squared_mahalanobis(off, odometry.motion.covariance) < 22.5);  // chi2: 99.9 %
+  CHECK(translation_sigma(odometry.motion.covariance) < sigma);
+}
+
 TEST_CASE("A keyframe has the odometry from the one before, frames between included") {
   TrackedCircle world(60);
   StereoTracker tracker = world.tracker();
@@ -176,11 +198,50 @@ TEST_CASE("A keyframe has the odometry from the one before, frames between inclu
   CHECK(static_cast<int>(odometry.keypoints.size()) == second.odometer_inliers);
   const KeyframeId second_id = add(second);
   CHECK(world.map().at(second_id).odometry != nullptr);
-  // A frame that the odometer cannot follow breaks the chain.
-  TrackedFrame third = tracker.track(without_right(world.frame(++index)), world.map());
-  REQUIRE(third.tracked());
-  while (!third.keyframe) third = tracker.track(world.frame(++index), world.map());
-  CHECK(third.keyframe->odometry == nullptr);
+}
+
+// The odometer cannot follow a frame without depths, and the map has the frames on both sides. The
+// frame after them, in which the map shows nothing, becomes a keyframe.
+TEST_CASE("Where the odometer gave no motion between keyframes, the map's is in its place") {
+  TrackedCircle world(60);
+  StereoTracker tracker = world.tracker();
+  const TrackedFrame made = track_until_keyframe(tracker, world, true, 20);
+  REQUIRE(made.keyframe);
+  const KeyframeId before = world.filled.map.add_keyframe(*made.keyframe);
+  auto index = static_cast<std::size_t>(made.frame_index);
+  for (int i = 0; i < 2; ++i) {
+    const Frame next = world.frame(++index);
+    const TrackedFrame tracked =
+        tracker.track(i == 0 ? without_right(next) : next, world.map(), false);
+    CHECK(tracked.source == PoseSource::kLocalMap);
+  }
+  forget_landmarks(world);
+  const TrackedFrame after = tracker.track(world.frame(++index), world.map());
+  check_odometry(world, made, after, before, 0.02);
+}
+
+// As where known ground comes back into view after drift, or where the odometer follows what moves.
+TEST_CASE("Where the map contradicts the odometer, its motion counts as off by as much") {
+  TrackedCircle world(60);
+  StereoTracker tracker = world.tracker();
+  const TrackedFrame made = track_until_keyframe(tracker, world, true, 20);
+  REQUIRE(made.keyframe);
+  const KeyframeId before = world.filled.map.add_keyframe(*made.keyframe);
+  auto index = static_cast<std::size_t>(made.frame_index);
+  const Eigen::Vector3d shift(0.01, -0.01, 0.01);
+  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> moved;
+  for (const LandmarkId id : world.map().landmark_ids()) {
+    moved.emplace_back(id, world.map().at(id).point_in_world + shift);
+  }
+  world.filled.map.move({}, moved);
+  const TrackedFrame jumped = tracker.track(world.frame(++index), world.map(), false);
+  CHECK(jumped.source == PoseSource::kLocalMap);
+  CHECK(pose_scene::translation_error(jumped.cam_from_world, world.true_pose(index)) > 0.01);
+  forget_landmarks(world);
+  const TrackedFrame after = tracker.track(world.frame(++index), world.map());
+  check_odometry(world, made, after, before, 0.03);
+  const Matrix6d& covariance = after.keyframe->odometry->motion.covariance;
+  CHECK(covariance.topLeftCorner<3, 3>().trace() > shift.squaredNorm());
 }
 
 TEST_CASE("Where the map shows only an edge of the image, the last frame holds the pose") {
