@@ -1,218 +1,13 @@
 #include <algorithm>
-#include <cmath>
-#include <iterator>
-#include <tuple>
+#include <set>
 #include <utility>
 
+#include "backend/incremental/condensation_groups.h"
 #include "backend/incremental/incremental_solver.h"
 
-// How an IncrementalSolver condenses what it has not seen for a while, and takes it apart again.
+// How an IncrementalSolver condenses what it has not seen for a while.
 
 namespace hybrid_slam {
-
-namespace {
-
-// Poses of a condensed term, of which it keeps a dense matrix.
-constexpr std::size_t kMostPoses = 16;
-
-// Condensed landmarks keep their place before their anchor while the poses that see them have not
-// moved against one another by more than this, in standard deviations of an observation.
-constexpr double kStill = 0.05;
-
-}  // namespace
-
-// The deltas of a condensed term's poses now.
-Eigen::VectorXd IncrementalSolver::deltas_of(const std::vector<std::uint32_t>& poses) const {
-  Eigen::VectorXd deltas(static_cast<Eigen::Index>(6 * poses.size()));
-  Eigen::Index row = 0;
-  for (const std::uint32_t pose : poses) {
-    deltas.segment<6>(row) = tree_.delta(pose);
-    row += 6;
-  }
-  return deltas;
-}
-
-std::vector<Eigen::Vector3d> IncrementalSolver::places_of(
-    const std::vector<std::uint32_t>& poses) const {
-  std::vector<Eigen::Vector3d> places;
-  for (const std::uint32_t pose : poses) places.push_back(pose_with(pose).tangent.place);
-  return places;
-}
-
-// How far a view of each pose is, in standard deviations of an observation, from what it would be
-// if the poses had moved together since they had these deltas. A turn by t moves what is seen by
-// |derivative| t, and by a part t of that in second order; a way counts by the turn that it looks
-// like.
-std::vector<double> IncrementalSolver::shape_change(const CondensedTerm& term,
-                                                    const Eigen::VectorXd& since) const {
-  std::vector<double> change;
-  Vector6d common = Vector6d::Zero();
-  for (std::size_t i = 0; i < term.poses.size(); ++i) {
-    const WorldTangent& tangent = pose_with(term.poses[i]).tangent;
-    const Vector6d moved =
-        tree_.delta(term.poses[i]) - since.segment<6>(static_cast<Eigen::Index>(6 * i));
-    const Vector6d xi = tangent.at_origin(moved);
-    if (i == 0 && !term.is_held) common = xi;
-    const Vector6d own = tangent.increment(xi - common);
-    const CondensedTerm::Reach& reach = term.reach[i];
-    const double views = std::max(reach.views, 1);
-    change.push_back(own.tail<3>().norm() * std::sqrt(reach.by_turn / views) +
-                     own.head<3>().norm() * std::sqrt(reach.by_way / views));
-  }
-  return change;
-}
-
-IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_t index) {
-  CondensedTerm& term = condensed_[index];
-  Evaluation result;
-  if (term.members.empty()) return result;
-  const Eigen::VectorXd moved = deltas_of(term.poses) - term.at;
-  result.squared_norm =
-      std::max(term.squared_norm + moved.dot(2 * term.gradient + term.times(moved)), 0.0);
-  result.cost = std::max(result.squared_norm + term.loss_excess, 0.0);
-  result.rows = term.rows;
-  if (!term.is_stale) {
-    const std::vector<double> since_placed = shape_change(term, term.placed);
-    term.is_stale = *std::max_element(since_placed.begin(), since_placed.end()) > kStill;
-  }
-  const std::vector<double> change = shape_change(term, term.at);
-  for (std::size_t i = 0; i < change.size(); ++i) {
-    const CondensedTerm::Reach& reach = term.reach[i];
-    if (reach.by_turn > 0) {
-      result.squared_mismatch += std::pow(change[i], 4) * reach.views * reach.views / reach.by_turn;
-    }
-  }
-  return result;
-}
-
-// A member as a term of its own, not linearised.
-LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t member) const {
-  const CondensedTerm::Member& of = term.members[member];
-  LandmarkTerm landmark;
-  landmark.base = inverse(pose_at(of.anchor)) * of.in_anchor.cast<double>();
-  const std::size_t end =
-      member + 1 < term.members.size() ? term.members[member + 1].first : term.observations.size();
-  for (std::size_t k = of.first; k < end; ++k) {
-    LandmarkView view;
-    view.observation = term.observations[k];
-    view.pose = poses_[observations_[view.observation].frame].variable;
-    view.fixed = variables_[view.pose].fixed;
-    if (!view.fixed && std::find(landmark.poses.begin(), landmark.poses.end(), view.pose) ==
-                           landmark.poses.end()) {
-      landmark.poses.push_back(view.pose);
-    }
-    landmark.views.push_back(view);
-  }
-  return landmark;
-}
-
-std::size_t IncrementalSolver::member_of(std::uint32_t point) const {
-  const std::vector<CondensedTerm::Member>& members = condensed_[condensed_in_[point]].members;
-  return static_cast<std::size_t>(
-      std::lower_bound(members.begin(), members.end(), point,
-                       [](const CondensedTerm::Member& of, std::uint32_t wanted) {
-                         return of.landmark < wanted;
-                       }) -
-      members.begin());
-}
-
-// A landmark by itself, linearised at the present estimate, wherever it is kept.
-LandmarkTerm IncrementalSolver::linearized_landmark(std::uint32_t point) const {
-  LandmarkTerm landmark = taken_out(condensed_[condensed_in_[point]], member_of(point));
-  linearize(landmark, landmark.base);
-  return landmark;
-}
-
-Eigen::Vector3d IncrementalSolver::condensed_point(std::uint32_t point) const {
-  const CondensedTerm& term = condensed_[condensed_in_[point]];
-  const CondensedTerm::Member& of = term.members[member_of(point)];
-  if (!term.is_stale) return inverse(pose_at(of.anchor)) * of.in_anchor.cast<double>();
-  const LandmarkTerm landmark = linearized_landmark(point);
-  if (!landmark.solvable) return landmark.base;
-  return landmark.base + displacement(landmark);
-}
-
-// The points of its term are minimised over their observations, with the poses where they are.
-void IncrementalSolver::place(std::uint32_t point) {
-  if (condensed_in_.at(point) == kNone) return;
-  CondensedTerm& term = condensed_[condensed_in_[point]];
-  if (!term.is_stale) return;
-  for (std::size_t i = 0; i < term.members.size(); ++i) {
-    LandmarkTerm landmark = taken_out(term, i);
-    linearize(landmark, landmark.base);
-    if (!landmark.solvable) continue;
-    CondensedTerm::Member& of = term.members[i];
-    of.in_anchor = (pose_at(of.anchor) * (landmark.base + displacement(landmark))).cast<float>();
-  }
-  term.placed = deltas_of(term.poses);
-  term.is_stale = false;
-}
-
-// Makes a condensed term anew from its observations.
-double IncrementalSolver::linearize_condensed(std::uint32_t index) {
-  CondensedTerm& term = condensed_[index];
-  const std::vector<std::uint32_t> poses = term.poses;
-  std::vector<LandmarkTerm> landmarks;
-  std::vector<double> costs;
-  for (std::size_t i = 0; i < term.members.size(); ++i) {
-    landmarks.push_back(taken_out(term, i));
-    LandmarkTerm& landmark = landmarks.back();
-    linearize(landmark, landmark.base);
-    if (landmark.solvable) {  // where it is best with its poses where they are
-      costs.push_back(linearize(landmark, landmark.base + displacement(landmark)));
-    } else {
-      costs.push_back(0);
-    }
-  }
-  std::vector<const LandmarkTerm*> members;
-  for (const LandmarkTerm& landmark : landmarks) members.push_back(&landmark);
-  term.begin(poses, deltas_of(poses));
-  term.add(members, costs, places_of(poses));
-  double cost = 0;
-  for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    cost += costs[i];
-    CondensedTerm::Member& of = term.members[i];
-    of.in_anchor = (pose_at(of.anchor) * landmarks[i].base).cast<float>();
-  }
-  return cost;
-}
-
-// Its landmarks become terms of their own.
-void IncrementalSolver::take_apart(std::uint32_t index) {
-  const std::uint32_t id = condensed_ids_[index];
-  std::vector<LandmarkTerm> landmarks;
-  for (std::size_t i = 0; i < condensed_[index].members.size(); ++i) {
-    landmarks.push_back(taken_out(condensed_[index], i));
-  }
-  const CondensedTerm term = condensed_[index];
-  drop_term(id);
-  condensed_count_ -= landmarks.size();
-  if (terms_[id].pending) std::erase(pending_, id);
-  if (terms_[id].dirty) std::erase(dirty_, id);
-  free_terms_.push_back(id);
-  for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    const std::uint32_t point = term.members[i].landmark;
-    condensed_in_[point] = kNone;
-    landmarks_[point] = std::make_unique<LandmarkTerm>(std::move(landmarks[i]));
-    landmark_terms_[point] = add_term(TermKind::kLandmark, point);
-    for (const std::uint32_t v : all_variables(*landmarks_[point])) link(v, landmark_terms_[point]);
-    mark_dirty(landmark_terms_[point]);
-    live_points_.push_back(point);
-  }
-}
-
-// Those of these terms that are condensed.
-void IncrementalSolver::take_apart(const std::vector<std::uint32_t>& terms) {
-  for (const std::uint32_t id : std::vector<std::uint32_t>(terms)) {
-    if (terms_[id].kind == TermKind::kCondensed) take_apart(terms_[id].index);
-  }
-}
-
-// Takes apart what a landmark is condensed in, if it is.
-LandmarkTerm& IncrementalSolver::live(std::uint32_t point) {
-  if (condensed_in_[point] != kNone) take_apart(condensed_in_[point]);
-  return *landmarks_[point];
-}
 
 // Whether a landmark may be condensed: no recent pose sees it, and it is linearised where it is.
 // One that waits for that has waited long enough.
@@ -220,7 +15,7 @@ bool IncrementalSolver::is_old(std::uint32_t point, std::uint32_t recent) {
   const LandmarkTerm& landmark = *landmarks_[point];
   Term& term = terms_[landmark_terms_[point]];
   if (term.dirty || !landmark.solvable || !landmark.factors.empty() || landmark.poses.empty() ||
-      landmark.poses.size() > kMostPoses || !landmark.held_back.isZero(0)) {
+      !landmark.held_back.isZero(0)) {
     return false;
   }
   for (const LandmarkView& view : landmark.views) {
@@ -238,12 +33,7 @@ void IncrementalSolver::condense_old() {
   if (poses_.size() <= keep) return;
   const auto recent = static_cast<std::uint32_t>(poses_.size() - keep);
   const std::vector<std::int32_t> depths = tree_.depths();
-  struct Candidate {
-    std::int32_t clique;
-    std::vector<std::uint32_t> poses;
-    std::uint32_t point;
-  };
-  std::vector<Candidate> candidates;
+  std::vector<CondensableLandmark> candidates;
   std::erase_if(live_points_, [&](std::uint32_t point) {
     return point_there_[point] == 0 || condensed_in_[point] != kNone;
   });
@@ -256,77 +46,112 @@ void IncrementalSolver::condense_old() {
     const std::int32_t clique = tree_.clique_of(poses, depths);
     if (clique >= 0) candidates.push_back({clique, std::move(poses), point});
   }
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return std::tie(a.clique, a.poses, a.point) < std::tie(b.clique, b.poses, b.point);
-  });
-  std::vector<std::uint32_t> points;
-  std::vector<std::uint32_t> poses;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Candidate& next = candidates[i];
-    std::vector<std::uint32_t> united;
-    std::set_union(poses.begin(), poses.end(), next.poses.begin(), next.poses.end(),
-                   std::back_inserter(united));
-    if (!points.empty() &&
-        (united.size() > kMostPoses || candidates[i - 1].clique != next.clique)) {
-      condense(points, poses);
-      points.clear();
-      united = next.poses;
-    }
-    points.push_back(next.point);
-    poses = std::move(united);
+  // To be taken apart in what an update may spend on old terms.
+  const double most_work = options_.burst * options_.budget;
+  const std::vector<KnownGroup> known = known_groups(candidates, depths);
+  for (const CondensedGroup& group : condensed_groups(std::move(candidates), known, most_work)) {
+    condense(group);
   }
-  if (!points.empty()) condense(points, poses);
 }
 
-void IncrementalSolver::condense(std::vector<std::uint32_t> points,
-                                 const std::vector<std::uint32_t>& poses) {
+// The condensed terms that these landmarks may join: of the same cliques, and linearised well where
+// they were. What joins one is linear about where that was made, and wherever it was.
+std::vector<KnownGroup> IncrementalSolver::known_groups(
+    const std::vector<CondensableLandmark>& landmarks,
+    const std::vector<std::int32_t>& depths) const {
+  std::set<std::int32_t> cliques;
+  std::set<std::uint32_t> poses;
+  std::set<std::uint32_t> terms;
+  for (const CondensableLandmark& landmark : landmarks) {
+    cliques.insert(landmark.clique);
+    poses.insert(landmark.poses.begin(), landmark.poses.end());
+  }
+  for (const std::uint32_t pose : poses) {
+    for (const std::uint32_t id : variables_[pose].terms) {
+      const Term& term = terms_[id];
+      if (term.kind == TermKind::kCondensed && !term.dirty && !term.pending) terms.insert(id);
+    }
+  }
+  std::vector<KnownGroup> known;
+  for (const std::uint32_t id : terms) {
+    const CondensedTerm& term = condensed_[terms_[id].index];
+    const std::int32_t clique = tree_.clique_of(term.poses, depths);
+    if (!cliques.contains(clique)) continue;
+    KnownGroup group{clique, terms_[id].index, term.poses, {}};
+    for (std::size_t i = 0; i < term.members.size(); ++i) {
+      group.views.push_back(term.observations_of(i).size());
+    }
+    known.push_back(std::move(group));
+  }
+  return known;
+}
+
+void IncrementalSolver::condense(const CondensedGroup& group) {
+  std::vector<std::uint32_t> points = group.points;
   std::sort(points.begin(), points.end());
-  CondensedTerm made;
-  made.begin(poses, deltas_of(poses));
+  const std::uint32_t index = group.term == CondensedGroup::kNew ? free_condensed() : group.term;
+  CondensedTerm& term = condensed_[index];
+  const Eigen::VectorXd now = deltas_of(group.poses);
+  std::vector<std::uint32_t> linked;
+  if (group.term == CondensedGroup::kNew) {
+    term = {};
+    term.begin(group.poses, now);
+    condensed_ids_[index] = add_term(TermKind::kCondensed, index);
+  } else {
+    linked = all_variables_of_term(condensed_ids_[index]);
+    if (term.poses != group.poses) {
+      // A motion of all of them since the term was made is no change of their shape.
+      term.widen(group.poses, deltas_before(group.poses, term, term.at),
+                 deltas_before(group.poses, term, term.placed));
+    }
+  }
   std::vector<const LandmarkTerm*> landmarks;
   std::vector<double> costs;
   for (const std::uint32_t point : points) {
     landmarks.push_back(landmarks_[point].get());
     costs.push_back(terms_[landmark_terms_[point]].cost);
   }
-  made.add(landmarks, costs, places_of(poses));
-  for (const std::uint32_t point : points) {
-    const std::uint32_t id = landmark_terms_[point];
-    const LandmarkTerm& landmark = *landmarks_[point];
-    CondensedTerm::Member member;
-    member.landmark = point;
-    member.first = static_cast<std::uint32_t>(made.observations.size());
-    member.anchor = landmark.poses.front();
-    member.in_anchor = (pose_at(member.anchor) * this->point(point)).cast<float>();
-    made.members.push_back(member);
-    for (const LandmarkView& view : landmark.views) made.observations.push_back(view.observation);
-    for (const std::uint32_t v : all_variables(landmark)) unlink(v, id);
-    forget_sums(id);
-    landmarks_[point].reset();
-    landmark_terms_[point] = kNone;
-    free_terms_.push_back(id);
-  }
-  std::uint32_t index = 0;
-  if (free_condensed_.empty()) {
-    index = static_cast<std::uint32_t>(condensed_.size());
-    condensed_.emplace_back();
-    condensed_ids_.push_back(kNone);
-  } else {
-    index = free_condensed_.back();
-    free_condensed_.pop_back();
-  }
-  made.members.shrink_to_fit();
-  made.observations.shrink_to_fit();
-  condensed_[index] = std::move(made);
-  const std::uint32_t id = add_term(TermKind::kCondensed, index);
-  condensed_ids_[index] = id;
+  term.add(landmarks, costs, places_of(group.poses), now);
+  for (const std::uint32_t point : points) move_into(term, point);
+  term.order_members();
   for (const std::uint32_t point : points) condensed_in_[point] = index;
   condensed_count_ += points.size();
+  const std::uint32_t id = condensed_ids_[index];
   for (const std::uint32_t v : all_variables_of_term(id)) {
-    link(v, id);
+    if (std::find(linked.begin(), linked.end(), v) == linked.end()) link(v, id);
     variables_[v].terms.shrink_to_fit();
   }
   evaluate(id);
+}
+
+std::uint32_t IncrementalSolver::free_condensed() {
+  if (free_condensed_.empty()) {
+    condensed_.emplace_back();
+    condensed_ids_.push_back(kNone);
+    return static_cast<std::uint32_t>(condensed_.size()) - 1;
+  }
+  const std::uint32_t index = free_condensed_.back();
+  free_condensed_.pop_back();
+  return index;
+}
+
+// A landmark of which the term has the sums becomes a member of it, and no term of its own any
+// more.
+void IncrementalSolver::move_into(CondensedTerm& term, std::uint32_t point) {
+  const std::uint32_t id = landmark_terms_[point];
+  const LandmarkTerm& landmark = *landmarks_[point];
+  CondensedTerm::Member member;
+  member.landmark = point;
+  member.first = static_cast<std::uint32_t>(term.observations.size());
+  member.anchor = landmark.poses.front();
+  member.in_anchor = (pose_at(member.anchor) * this->point(point)).cast<float>();
+  term.members.push_back(member);
+  for (const LandmarkView& view : landmark.views) term.observations.push_back(view.observation);
+  for (const std::uint32_t v : all_variables(landmark)) unlink(v, id);
+  forget_sums(id);
+  landmarks_[point].reset();
+  landmark_terms_[point] = kNone;
+  free_terms_.push_back(id);
 }
 
 }  // namespace hybrid_slam

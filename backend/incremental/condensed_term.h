@@ -36,25 +36,48 @@ struct CondensedTerm {
   std::vector<std::uint32_t> observations;
   std::vector<std::uint32_t> poses;  // that vary
   bool is_held = false;              // by a view of a fixed pose
-  // H: blocks (i, i), and (i, j) with j < i, row after row.
+  // H: blocks (i, i), and between two poses, in what takes less memory: as they are, (i, j) with
+  // j < i, row after row, or as they come from the landmarks, each of which leaves
+  // -reduced_i reduced_j^T on two poses that see it (LandmarkTerm).
   std::vector<Matrix6d> own;
   std::vector<Eigen::Matrix<float, 6, 6>> shared;
-  Eigen::VectorXd gradient;  // at `at`
-  Eigen::VectorXd at;        // the poses' deltas when it was made
-  double squared_norm = 0;   // likewise: of the weighted residuals
-  double loss_excess = 0;    // what the losses make of that, beyond it
+  struct Reduced {
+    std::uint32_t slot = 0;  // of its pose
+    Eigen::Matrix<float, 6, 3> by_pose = Eigen::Matrix<float, 6, 3>::Zero();
+  };
+  std::vector<Reduced> reduced;
+  std::vector<std::uint32_t> reduced_first;  // of each landmark's; behind the last one's at the end
+  Eigen::VectorXd gradient;                  // at `at`
+  Eigen::VectorXd at;                        // the poses' deltas when it was made
+  double squared_norm = 0;                   // likewise: of the weighted residuals
+  double loss_excess = 0;                    // what the losses make of that, beyond it
   int rows = 0;
   std::vector<Reach> reach;  // by pose
   Eigen::VectorXd placed;    // the poses' deltas when the members' points were minimised
   bool is_stale = false;     // its views have changed since, so that they are to be once more
 
+  std::span<const std::uint32_t> observations_of(std::size_t member) const;
+  // Members that were added come in among the others.
+  void order_members();
+
+  // What a term takes of memory that landmarks with so many views by these many poses share.
+  static std::size_t bytes(std::size_t poses, std::size_t views);
+
   // Empties what sums up, for these poses with these deltas.
   void begin(std::vector<std::uint32_t> poses, Eigen::VectorXd deltas);
 
-  // Adds landmarks' linearisations. `costs`: twice, with their losses, there. `places`: of the
-  // poses' tangents.
+  // More poses, that nothing is said about so far. `all` has those that are there already, too;
+  // ascending as these. The new ones come with deltas for `at` and for `placed`.
+  void widen(std::vector<std::uint32_t> all, const Eigen::VectorXd& new_at,
+             const Eigen::VectorXd& new_placed);
+
+  // Adds landmarks' linearisations. `costs`: twice, with their losses, at the deltas `now`.
+  // `places`: of the poses' tangents.
   void add(std::span<const LandmarkTerm* const> landmarks, std::span<const double> costs,
-           std::span<const Eigen::Vector3d> places);
+           std::span<const Eigen::Vector3d> places, const Eigen::VectorXd& now);
+
+  // Of the weighted residuals, as far as second order tells.
+  double squared_norm_at(const Eigen::VectorXd& deltas) const;
 
   // H v.
   Eigen::VectorXd times(const Eigen::VectorXd& v) const;
@@ -68,8 +91,13 @@ struct CondensedTerm {
   std::size_t slot(std::uint32_t pose) const;
   static std::size_t place_of(std::size_t i, std::size_t j) { return i * (i - 1) / 2 + j; }
   Matrix6d shared_block(std::size_t i, std::size_t j) const;
-  void add(const LandmarkTerm& landmark, double cost, Sums& sums);
-  void keep(const Sums& sums, std::span<const Eigen::Vector3d> places);
+  std::span<const Reduced> reduced_of(std::size_t landmark) const;
+  void add(const LandmarkTerm& landmark, Sums& sums);
+  void add_known(Sums& sums) const;
+  void add_reduced(const LandmarkTerm& landmark, Sums& sums);
+  void keep(Sums& sums);
+  void assemble_reduced(std::size_t landmark, Front& front) const;
+  void make_up_for(const Sums& lost, std::span<const Eigen::Vector3d> places);
 };
 
 }  // namespace hybrid_slam

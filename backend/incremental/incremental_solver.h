@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "backend/incremental/block.h"
+#include "backend/incremental/condensation_groups.h"
 #include "backend/incremental/condensed_term.h"
 #include "backend/incremental/edge_term.h"
 #include "backend/incremental/incremental_options.h"
@@ -279,13 +280,21 @@ class IncrementalSolver final : private TermSource {
   // backend/incremental/condensation.cpp
   void condense_old();
   bool is_old(std::uint32_t point, std::uint32_t recent);
-  void condense(std::vector<std::uint32_t> points, const std::vector<std::uint32_t>& poses);
+  std::vector<KnownGroup> known_groups(const std::vector<CondensableLandmark>& landmarks,
+                                       const std::vector<std::int32_t>& depths) const;
+  void condense(const CondensedGroup& group);
+  std::uint32_t free_condensed();
+  void move_into(CondensedTerm& term, std::uint32_t point);
+  // backend/incremental/condensed_landmarks.cpp
   void take_apart(std::uint32_t index);
   void take_apart(const std::vector<std::uint32_t>& terms);
   LandmarkTerm& live(std::uint32_t point);
   double linearize_condensed(std::uint32_t index);
   Eigen::VectorXd deltas_of(const std::vector<std::uint32_t>& poses) const;
   std::vector<Eigen::Vector3d> places_of(const std::vector<std::uint32_t>& poses) const;
+  Vector6d common_motion(const CondensedTerm& term, const Eigen::VectorXd& since) const;
+  Eigen::VectorXd deltas_before(const std::vector<std::uint32_t>& poses, const CondensedTerm& term,
+                                const Eigen::VectorXd& since) const;
   std::vector<double> shape_change(const CondensedTerm& term, const Eigen::VectorXd& since) const;
   LandmarkTerm taken_out(const CondensedTerm& term, std::size_t member) const;
   std::size_t member_of(std::uint32_t point) const;

@@ -6,6 +6,7 @@
 #include "backend/incremental/incremental_solver.h"
 #include "backend/problem/solve_graph.h"
 #include "cameras/geometry/se3.h"
+#include "test/backend/incremental/corridor.h"
 #include "test/backend/incremental/graph_feed.h"
 #include "test/backend/incremental/lawn_mower.h"
 
@@ -150,6 +151,28 @@ TEST_CASE("condensed landmarks: covariances are those of the whole") {
   const Eigen::MatrixXd of_condensed = survey.solver().covariance(variables);
   const Eigen::MatrixXd of_whole = whole.solver().covariance(variables);
   CHECK((of_condensed - of_whole).norm() < 0.01 * of_whole.norm());
+}
+
+TEST_CASE("condensed landmarks: long tracks are, too, however many poses they have") {
+  const FactorGraph graph = corridor_graph(240, 1, 0.14);
+  GraphFeed feed(graph, {});
+  std::size_t most_live = 0;
+  while (!feed.done()) {
+    feed.feed_next();
+    const IncrementalSolver& solver = feed.solver();
+    if (solver.pose_count() % 40 != 0) continue;
+    const std::size_t points = solver.graph().points.size();
+    most_live = std::max(most_live, points - solver.condensed_count());
+  }
+  std::vector<int> views(graph.points.size(), 0);
+  for (const GraphObservation& seen : graph.observations) ++views[seen.point];
+  std::sort(views.begin(), views.end());
+  // Most are seen by 40 poses and more, those at both ends by fewer.
+  REQUIRE(views[views.size() / 3] >= 40);
+  // Those in sight, 50, and what the 30 newest poses and ten more still saw.
+  CHECK(most_live < 120);
+  for (int i = 0; i < 5; ++i) feed.solver().update();
+  CHECK(excess(feed.solver()) < 1e-4);
 }
 
 TEST_CASE("condensed landmarks: what an update looks at does not grow with the survey", "[slow]") {

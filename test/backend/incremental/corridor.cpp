@@ -10,42 +10,41 @@ namespace hybrid_slam {
 
 namespace {
 
-constexpr double kStep = 1;     // [m]
 constexpr double kNearest = 3;  // ahead of the keyframes that see a landmark [m]
 constexpr double kFarthest = 10;
 constexpr double kSigma = 0.5;  // [px]
 
 // One step further along a line that sways a little.
-Rigid3d keyframe_pose(int index) {
-  const double sway = 0.1 * index;
+Rigid3d keyframe_pose(int index, double step) {
+  const double sway = 0.1 * step * index;
   const Eigen::Quaterniond heading(
       Eigen::AngleAxisd(0.05 * std::sin(sway), Eigen::Vector3d::UnitY()));
-  return inverse(Rigid3d(heading, {0.3 * std::cos(sway) - 0.3, 0, kStep * index}));
+  return inverse(Rigid3d(heading, {0.3 * std::cos(sway) - 0.3, 0, step * index}));
 }
 
 }  // namespace
 
-std::vector<Rigid3d> corridor_poses(int keyframes) {
+std::vector<Rigid3d> corridor_poses(int keyframes, double step) {
   std::vector<Rigid3d> poses;
-  for (int i = 0; i < keyframes; ++i) poses.push_back(keyframe_pose(i));
+  for (int i = 0; i < keyframes; ++i) poses.push_back(keyframe_pose(i, step));
   return poses;
 }
 
-FactorGraph corridor_graph(int keyframes, int landmarks_per_step) {
+FactorGraph corridor_graph(int keyframes, int landmarks_per_step, double step) {
   Random random(1);
   const Camera camera = synthetic_stereo_camera(0.5);
   FactorGraph graph;
   graph.cameras.push_back({camera, 0});
-  for (const Rigid3d& pose : corridor_poses(keyframes)) {
+  for (const Rigid3d& pose : corridor_poses(keyframes, step)) {
     graph.frames.push_back({pose, 0, graph.frames.empty()});
   }
-  for (int step = 0; step < keyframes; ++step) {
+  for (int i = 0; i < keyframes; ++i) {
     for (int k = 0; k < landmarks_per_step; ++k) {
       // On the walls, ahead of the keyframe of this number.
       const double side = random.uniform() < 0.5 ? -1 : 1;
-      const double ahead = kStep * step + kNearest;
+      const double ahead = step * i + kNearest;
       graph.points.push_back(
-          {{1.5 * side, random.uniform(-1, 1), ahead + random.uniform()}, false});
+          {{1.5 * side, random.uniform(-1, 1), ahead + step * random.uniform()}, false});
     }
   }
   for (std::uint32_t i = 0; i < graph.frames.size(); ++i) {

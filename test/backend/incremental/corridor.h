@@ -7,10 +7,10 @@
 namespace hybrid_slam {
 
 // A straight run of stereo keyframes without any loop: as many landmarks in sight and as many
-// keyframes that share them everywhere. From disturbed starts.
-FactorGraph corridor_graph(int keyframes, int landmarks_per_step);
+// keyframes that share them everywhere: eight, with a step of 1 m. From disturbed starts.
+FactorGraph corridor_graph(int keyframes, int landmarks_per_step, double step = 1);
 
 // Where its keyframes truly are, cam_from_world.
-std::vector<Rigid3d> corridor_poses(int keyframes);
+std::vector<Rigid3d> corridor_poses(int keyframes, double step = 1);
 
 }  // namespace hybrid_slam

@@ -5,6 +5,10 @@
 #include "backend/incremental/world_tangent.h"
 #include "test/support/random.h"
 
+#include <algorithm>
+#include <numeric>
+#include <span>
+
 #include <catch2/catch.hpp>
 
 #include <Eigen/Dense>
@@ -75,7 +79,8 @@ struct Assembled {
   Eigen::VectorXd gradient;
 };
 
-Assembled assemble(const LandmarkTerm& term, std::uint32_t poses) {
+template <typename Term>
+Assembled assemble(const Term& term, std::uint32_t poses) {
   std::vector<std::uint32_t> slot_of(poses);
   for (std::uint32_t i = 0; i < poses; ++i) slot_of[i] = poses - 1 - i;
   Front front(poses, slot_of);
@@ -180,44 +185,126 @@ LandmarkView view_of(const Eigen::Vector3d& point, std::uint32_t pose, const Eig
   return view;
 }
 
-TEST_CASE("condensed term: in single precision it says nothing about a common motion") {
-  Random random(8);
-  std::vector<Eigen::Vector3d> places;
-  for (int i = 0; i < 6; ++i) places.emplace_back(i, random.uniform(-1, 1), 30 + random.uniform());
-  std::vector<LandmarkTerm> landmarks(40);
-  std::vector<const LandmarkTerm*> all;
-  std::vector<double> costs(landmarks.size(), 0);
-  for (LandmarkTerm& landmark : landmarks) {
-    const Eigen::Vector3d point = random.vector(3, 5);
-    const int first = random.integer(0, 2);
-    for (std::uint32_t i = 0; i < 4; ++i) {
-      const std::uint32_t pose = static_cast<std::uint32_t>(first) + i;
-      landmark.views.push_back(view_of(point, pose, places[pose], random));
+// Landmarks that some of the poses in a row see, each of them as many, and what they are condensed
+// to.
+struct CondensedRow {
+  CondensedRow(std::size_t poses, std::size_t count, std::size_t seen_by) : landmarks(count) {
+    for (std::size_t i = 0; i < poses; ++i) {
+      places.emplace_back(static_cast<double>(i), random.uniform(-1, 1), 30 + random.uniform());
     }
-    landmark.eliminate();
-    all.push_back(&landmark);
+    std::vector<const LandmarkTerm*> all;
+    for (LandmarkTerm& landmark : landmarks) {
+      const Eigen::Vector3d point = random.vector(3, 5);
+      const int first = random.integer(0, static_cast<int>(poses - seen_by));
+      for (std::uint32_t i = 0; i < seen_by; ++i) {
+        const std::uint32_t pose = static_cast<std::uint32_t>(first) + i;
+        landmark.views.push_back(view_of(point, pose, places[pose], random));
+        landmark.poses.push_back(pose);
+      }
+      landmark.eliminate();
+      all.push_back(&landmark);
+    }
+    std::vector<std::uint32_t> numbers(poses);
+    std::iota(numbers.begin(), numbers.end(), 0U);
+    const Eigen::VectorXd start = Eigen::VectorXd::Zero(rows());
+    term.begin(numbers, start);
+    term.add(all, std::vector<double>(count, 0), places, start);
   }
-  CondensedTerm term;
-  term.begin({0, 1, 2, 3, 4, 5}, Eigen::VectorXd::Zero(36));
-  term.add(all, costs, places);
-  const auto common_motion = [&] {
+
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(6 * places.size()); }
+
+  Eigen::VectorXd common_motion() {
     const Vector6d xi = random.vector(6, 1);
-    Eigen::VectorXd common(36);
+    Eigen::VectorXd common(rows());
     for (std::size_t i = 0; i < places.size(); ++i) {
       common.segment<6>(static_cast<Eigen::Index>(6 * i)) = WorldTangent{places[i]}.increment(xi);
     }
     return common;
-  };
-  const Eigen::VectorXd common = common_motion();
+  }
+
+  Random random{8};
+  std::vector<Eigen::Vector3d> places;
+  std::vector<LandmarkTerm> landmarks;
+  CondensedTerm term;
+};
+
+// Many views by few poses are kept as blocks between these, few by many as they are.
+CondensedRow many_or_few_views() {
+  const bool many = GENERATE(true, false);
+  CondensedRow made = many ? CondensedRow(6, 40, 4) : CondensedRow(24, 5, 20);
+  REQUIRE(made.term.shared.empty() == !many);
+  REQUIRE(made.term.reduced.empty() == many);
+  return made;
+}
+
+TEST_CASE("condensed term: it is the sum of its landmarks' terms, to single precision") {
+  const CondensedRow made = many_or_few_views();
+  const auto poses = static_cast<std::uint32_t>(made.places.size());
+  const Assembled whole = assemble(made.term, poses);
+  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(made.rows(), made.rows());
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(made.rows());
+  for (const LandmarkTerm& landmark : made.landmarks) {
+    const Assembled one = assemble(landmark, poses);
+    hessian += one.hessian;
+    gradient += one.gradient;
+  }
+  CHECK((whole.hessian - hessian).norm() < 1e-6 * hessian.norm());
+  CHECK((whole.gradient - gradient).norm() < 1e-12 * gradient.norm());
+  const Eigen::VectorXd v = Random(3).vector(static_cast<int>(made.rows()), 1);
+  CHECK((made.term.times(v) - whole.hessian * v).norm() < 1e-12 * (whole.hessian * v).norm());
+}
+
+TEST_CASE("condensed term: what joins it later counts as if it had been there") {
+  // As blocks, as views, and as views that become blocks.
+  const std::size_t first = GENERATE(20, 2, 1);
+  CondensedRow made = first == 2 ? CondensedRow(24, 5, 20) : CondensedRow(8, 60, 4);
+  const auto poses = static_cast<std::uint32_t>(made.places.size());
+  const Eigen::VectorXd now = made.random.vector(static_cast<int>(made.rows()), 1e-3);
+  const std::vector<std::uint32_t> all = made.term.poses;
+  std::vector<const LandmarkTerm*> landmarks;
+  std::vector<std::uint32_t> some;  // that the first landmarks have
+  for (std::size_t k = 0; k < made.landmarks.size(); ++k) {
+    landmarks.push_back(&made.landmarks[k]);
+    if (k < first) {
+      some.insert(some.end(), made.landmarks[k].poses.begin(), made.landmarks[k].poses.end());
+    }
+  }
+  std::sort(some.begin(), some.end());
+  some.erase(std::unique(some.begin(), some.end()), some.end());
+  std::vector<Eigen::Vector3d> some_places;
+  for (const std::uint32_t pose : some) some_places.push_back(made.places[pose]);
+  const std::vector<double> costs(landmarks.size(), 7);
+  const std::span<const LandmarkTerm* const> known = landmarks;
+  const std::span<const double> their_costs = costs;
+
+  CondensedTerm joined;
+  const Eigen::VectorXd start = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(6 * some.size()));
+  joined.begin(some, start);
+  joined.add(known.first(first), their_costs.first(first), some_places, start);
+  joined.widen(all, now, now);
+  joined.add(known.subspan(first), their_costs.subspan(first), made.places, now);
+
+  const Assembled expected = assemble(made.term, poses);
+  const Assembled actual = assemble(joined, poses);
+  CHECK((actual.hessian - expected.hessian).norm() < 1e-6 * expected.hessian.norm());
+  CHECK((actual.gradient - expected.gradient).norm() < 1e-6 * expected.gradient.norm());
+  CHECK(joined.squared_norm_at(now) == Approx(made.term.squared_norm_at(now)).epsilon(1e-5));
+  CHECK(joined.rows == made.term.rows);
+}
+
+TEST_CASE("condensed term: in single precision it says nothing about a common motion") {
+  CondensedRow made = many_or_few_views();
+  const CondensedTerm& term = made.term;
+  const Eigen::VectorXd common = made.common_motion();
   double size = 0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  for (std::size_t i = 0; i < made.places.size(); ++i) {
     const auto own = common.segment<6>(static_cast<Eigen::Index>(6 * i));
     size += own.dot(term.own[i] * own);
   }
   CHECK(std::abs(common.dot(term.times(common))) < 1e-12 * size);
-  CHECK(std::abs(common_motion().dot(term.times(common))) < 1e-12 * size);
+  CHECK(std::abs(made.common_motion().dot(term.times(common))) < 1e-12 * size);
   Eigen::VectorXd bent = common;
-  bent.head<6>() += random.vector(6, 1);
+  bent.head<6>() += made.random.vector(6, 1);
   CHECK(bent.dot(term.times(bent)) > 1e-4 * size);
 }
 
