@@ -30,6 +30,7 @@ void UpdateWorker::work() {
     }
   } catch (...) {
     failure_ = std::current_exception();
+    failed_ = true;
     results_.close();
     done_();
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <exception>
 #include <functional>
 #include <thread>
@@ -19,8 +20,8 @@ class UpdateWorker {
 
   void start(LocalUpdate update) { updates_.push(std::move(update)); }
 
-  // Whether the update that was started has been run.
-  bool is_done() const { return results_.size() > 0; }
+  // Whether the update that was started has been run, or has failed.
+  bool is_done() const { return failed_ || results_.size() > 0; }
 
   // Waits for it. Throws what it threw.
   LocalUpdate take();
@@ -31,7 +32,8 @@ class UpdateWorker {
   std::function<void()> done_;
   Channel<LocalUpdate> updates_{1};
   Channel<LocalUpdate> results_{1};
-  std::exception_ptr failure_;  // before results_ is closed
+  std::exception_ptr failure_;  // before `failed_` is set and results_ closed
+  std::atomic<bool> failed_ = false;
   std::jthread thread_;
 };
 
