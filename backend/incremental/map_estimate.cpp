@@ -139,7 +139,7 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
   for (std::size_t i = 0, seen = 0; i < others.size(); ++i) {
     const KeyframeId id = others[i].second;
     seen += map.at(id).landmarks.size();
-    if (seen <= enough) {
+    if (i == 0 || seen <= enough) {
       next.push_back(id);
     } else {
       behind_.push_back(pose_of_[id.value]);
