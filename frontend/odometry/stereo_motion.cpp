@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "frontend/odometry/stereo_motion_noise.h"
+#include "frontend/odometry/stereo_motion_covariance.h"
 #include "frontend/pose/damped_gauss_newton.h"
 #include "frontend/pose/random_sampler.h"
 #include "frontend/pose/rigid_alignment.h"
@@ -18,7 +18,6 @@ namespace {
 constexpr double kHypothesisConverged = 1e-6;  // step [m, rad]
 constexpr GaussNewtonStop kRefinementStop{100, 1e-8};
 constexpr int kMaxRefinements = 5;  // inliers are chosen anew before each
-constexpr int kNoiseRounds = 2;     // likewise, and the noise is estimated anew
 
 class StereoMotionSolver {
  public:
@@ -37,16 +36,31 @@ class StereoMotionSolver {
     std::optional<Rigid3d> motion = search();
     if (motion) motion = refine(*motion);
     if (!motion) return std::nullopt;
-    return weigh(*motion);
+    std::vector<int> inliers = find_inliers(*motion);
+    if (static_cast<int>(inliers.size()) < options_.min_inliers) return std::nullopt;
+    std::vector<StereoSight> sights;
+    for (const int i : inliers) {
+      const Point& p = points_[static_cast<std::size_t>(i)];
+      sights.push_back(
+          {p.in_previous, p.measured, p.squared_weight, p.previous_variance, p.current_variance});
+    }
+    const std::optional<Matrix6d> covariance =
+        stereo_motion_covariance(params_, *motion, sights, options_.inlier_threshold);
+    if (!covariance) return std::nullopt;
+    StereoMotionSolution solution{*motion, *covariance, std::move(inliers)};
+    for (int& i : solution.inliers) i = points_[static_cast<std::size_t>(i)].index;
+    return solution;
   }
 
  private:
   struct Point {
-    int index;  // among the caller's correspondences
-    StereoSight sight;
+    int index;                    // among the caller's correspondences
     Eigen::Vector3d in_previous;  // triangulated
     Eigen::Vector3d in_current;   // the same; not finite where the disparity allows none
     Eigen::Vector4d measured;     // (u_left, v_left, u_right, v_right) in the current frame
+    double squared_weight;
+    double previous_variance;
+    double current_variance;
   };
 
   int size() const { return static_cast<int>(points_.size()); }
@@ -58,13 +72,8 @@ class StereoMotionSolver {
     if (!in_previous || !in_current) return;
     const double cu = std::max(std::abs(params_[2]), 1.0);
     const double weight = 1 / (std::abs(c.current[0] - params_[2]) / cu + 0.05);
-    const Eigen::Vector3d current(c.current[0], 0.5 * (c.current[1] + c.current[3]), c.current[2]);
-    points_.push_back({index,
-                       {c.previous, current, weight * weight, c.previous_sigma * c.previous_sigma,
-                        c.current_sigma * c.current_sigma},
-                       *in_previous,
-                       *in_current,
-                       c.current});
+    points_.push_back({index, *in_previous, *in_current, c.current, weight * weight,
+                       c.previous_sigma * c.previous_sigma, c.current_sigma * c.current_sigma});
   }
 
   // One row per coordinate in single precision: a hypothesis is scored against all points by
@@ -126,11 +135,12 @@ class StereoMotionSolver {
         return std::nullopt;
       }
       // Both rows are measured, and the model has one: their mean, with twice the weight.
-      Eigen::Vector3d residual = m - p.sight.current;
+      const double v = 0.5 * (p.measured[1] + p.measured[3]);
+      Eigen::Vector3d residual(m[0] - p.measured[0], m[1] - v, m[2] - p.measured[2]);
       residual[1] *= std::numbers::sqrt2;
       d_point.row(1) *= std::numbers::sqrt2;
-      equations.add<3>(pose_jacobian<3>(d_point, point), residual, p.sight.squared_weight);
-      equations.cost += p.sight.squared_weight * residual.squaredNorm();
+      equations.add<3>(pose_jacobian<3>(d_point, point), residual, p.squared_weight);
+      equations.cost += p.squared_weight * residual.squaredNorm();
     }
     return equations;
   }
@@ -187,29 +197,6 @@ class StereoMotionSolver {
       inliers = std::move(now);
     }
     return motion;
-  }
-
-  // On the inliers, by their noise in both frames, which the residuals show.
-  std::optional<StereoMotionSolution> weigh(Rigid3d motion) const {
-    StereoNoise noise = independent_noise();
-    std::vector<int> inliers;
-    std::optional<StereoMotionUncertainty> uncertainty;
-    for (int i = 0; i < kNoiseRounds; ++i) {
-      if (uncertainty) noise = uncertainty->noise;
-      inliers = find_inliers(motion);
-      if (static_cast<int>(inliers.size()) < options_.min_inliers) return std::nullopt;
-      std::vector<StereoSight> sights;
-      for (const int k : inliers) sights.push_back(points_[static_cast<std::size_t>(k)].sight);
-      const auto fitted = fit_stereo_motion(params_, motion, sights, noise);
-      if (!fitted) return std::nullopt;
-      motion = *fitted;
-      uncertainty =
-          stereo_motion_uncertainty(params_, motion, sights, noise, options_.inlier_threshold);
-      if (!uncertainty) return std::nullopt;
-    }
-    StereoMotionSolution solution{motion, uncertainty->covariance, std::move(inliers)};
-    for (int& k : solution.inliers) k = points_[static_cast<std::size_t>(k)].index;
-    return solution;
   }
 
   std::array<double, RectifiedStereo::kParamCount> params_;

@@ -36,16 +36,15 @@ struct StereoCorrespondence {
 
 struct StereoMotionSolution {
   Rigid3d current_from_previous;
-  // Of its left perturbation (translation, rotation): stereo_motion_uncertainty(). First order;
-  // what all matches are off by in common is not in it.
+  // Of its left perturbation (translation, rotation): stereo_motion_covariance(). First order; what
+  // all matches are off by in common is not in it.
   Matrix6d covariance;
   std::vector<int> inliers;  // indices of correspondences, ascending
 };
 
-// Ego-motion of a stereo pair: points triangulated from the previous frame, hypotheses from three
-// of them, least squares in the four coordinates in the current frame as VISO2 has it, and at last
-// fit_stereo_motion() on the noise of both frames, which the residuals show. VISO2's weights of
-// points stay, 1 / (|u - cu| / cu + 0.05) of the left image. Correspondences that are not finite or
+// Ego-motion of a stereo pair as VISO2 finds it: points triangulated from the previous frame,
+// hypotheses from three of them, least squares in the four coordinates in the current frame with
+// the weights 1 / (|u - cu| / cu + 0.05) of the left image. Correspondences that are not finite or
 // have no positive disparity in the previous frame are never inliers. None if fewer than
 // min_inliers agree or they leave the motion open. Same seed, same result.
 std::optional<StereoMotionSolution> solve_stereo_motion(
