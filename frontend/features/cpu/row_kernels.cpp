@@ -1,5 +1,10 @@
 #include "frontend/features/cpu/row_kernels.h"
 
+#include <algorithm>
+#include <bit>
+
+#include "frontend/features/definition/extremum.h"
+
 // Compiled once per instruction set; the best one that the machine has is chosen at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "frontend/features/cpu/row_kernels.cpp"
@@ -172,60 +177,66 @@ struct Range {
   Vector smallest, largest;
 };
 
-HWY_INLINE Range extend(Range range, Vector v) {
-  return {hn::Min(range.smallest, v), hn::Max(range.largest, v)};
+HWY_INLINE Range range_of(Range a, Range b) {
+  return {hn::Min(a.smallest, b.smallest), hn::Max(a.largest, b.largest)};
 }
 
-HWY_INLINE Range range_of(Vector a, Vector b) { return {hn::Min(a, b), hn::Max(a, b)}; }
-
-// Three samples of each of three rows.
-HWY_INLINE Range range_of_layer(const float* const* rows, std::size_t x) {
+// Of one column of three rows.
+HWY_INLINE Range range_of_column(const float* const* rows, std::size_t x) {
   const Floats d;
-  Range range = range_of(hn::LoadU(d, rows[0] + x - 1), hn::LoadU(d, rows[0] + x));
-  range = extend(range, hn::LoadU(d, rows[0] + x + 1));
-  for (std::size_t row = 1; row < 3; ++row) {
-    range = extend(range, hn::LoadU(d, rows[row] + x - 1));
-    range = extend(range, hn::LoadU(d, rows[row] + x));
-    range = extend(range, hn::LoadU(d, rows[row] + x + 1));
+  const Vector a = hn::LoadU(d, rows[0] + x);
+  const Vector b = hn::LoadU(d, rows[1] + x);
+  const Vector c = hn::LoadU(d, rows[2] + x);
+  return {hn::Min(hn::Min(a, b), c), hn::Max(hn::Max(a, b), c)};
+}
+
+void ranges_of_columns(const float* const* rows, std::size_t layers, std::size_t width,
+                       float* const* smallest, float* const* largest) {
+  const Floats d;
+  for (std::size_t x = 0; x < width; x += hn::Lanes(d)) {
+    Range below = range_of_column(rows, x);
+    Range here = range_of_column(rows + 3, x);
+    for (std::size_t layer = 0; layer < layers; ++layer) {
+      const Range above = range_of_column(rows + 3 * (layer + 2), x);
+      const Range all = range_of(range_of(below, here), above);
+      hn::StoreU(all.smallest, d, smallest[layer] + x);
+      hn::StoreU(all.largest, d, largest[layer] + x);
+      below = here;
+      here = above;
+    }
   }
-  return range;
 }
 
-// Three samples of one row, and one beside the sample in the middle.
-HWY_INLINE Range range_beside(const float* row, std::size_t x, Vector beside) {
-  const Floats d;
-  Range range = range_of(beside, hn::LoadU(d, row + x - 1));
-  range = extend(range, hn::LoadU(d, row + x));
-  return extend(range, hn::LoadU(d, row + x + 1));
-}
-
-std::size_t extrema_of_row(const float* const* rows, std::size_t first, std::size_t last,
-                           float threshold, int* found) {
+std::size_t extrema_of_row(const float* const* rows, const float* smallest, const float* largest,
+                           std::size_t first, std::size_t last, float threshold, int* found) {
   const Floats d;
   const std::size_t lanes = hn::Lanes(d);
   const Vector above = hn::Set(d, threshold);
   const Vector below = hn::Neg(above);
+  const auto three = [&](const float* of, std::size_t x, const auto& chosen) HWY_ATTR {
+    return chosen(chosen(hn::LoadU(d, of + x - 1), hn::LoadU(d, of + x + 1)), hn::LoadU(d, of + x));
+  };
+  const auto max = [](Vector a, Vector b) HWY_ATTR { return hn::Max(a, b); };
+  const auto min = [](Vector a, Vector b) HWY_ATTR { return hn::Min(a, b); };
   std::size_t count = 0;
-  for (std::size_t x = first; x < last; x += lanes) {
+  // From the second vector on they begin at a multiple of their size: half of the reads then lie in
+  // one line of the cache.
+  for (std::size_t x = first, next = 0; x < last; x = next) {
+    next = std::min((x / lanes + 1) * lanes, last);
     const Vector v = hn::LoadU(d, rows[4] + x);
-    auto maxima = hn::Gt(v, above);
-    auto minima = hn::Lt(v, below);
-    if (hn::AllFalse(d, hn::Or(maxima, minima))) continue;
-    const Range before = range_beside(rows[3], x, hn::LoadU(d, rows[4] + x - 1));
-    const Range after = range_beside(rows[5], x, hn::LoadU(d, rows[4] + x + 1));
-    maxima = hn::And(maxima, hn::And(hn::Ge(v, before.largest), hn::Gt(v, after.largest)));
-    minima = hn::And(minima, hn::And(hn::Le(v, before.smallest), hn::Lt(v, after.smallest)));
-    if (hn::AllFalse(d, hn::Or(maxima, minima))) continue;
-    const Range lower = range_of_layer(rows, x);
-    const Range upper = range_of_layer(rows + 6, x);
-    maxima = hn::And(maxima, hn::And(hn::Ge(v, lower.largest), hn::Gt(v, upper.largest)));
-    minima = hn::And(minima, hn::And(hn::Le(v, lower.smallest), hn::Lt(v, upper.smallest)));
-    const auto extrema = hn::Or(maxima, minima);
-    if (hn::AllFalse(d, extrema)) continue;
+    const auto high = hn::Gt(v, above);
+    const auto low = hn::Lt(v, below);
+    if (hn::AllFalse(d, hn::Or(high, low))) continue;
+    const auto maxima = hn::And(high, hn::Ge(v, three(largest, x, max)));
+    const auto minima = hn::And(low, hn::Le(v, three(smallest, x, min)));
     std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(d, extrema, bytes);
-    for (std::size_t lane = 0; lane < lanes && x + lane < last; ++lane) {
-      if (bytes[lane / 8] >> (lane % 8) & 1) found[count++] = static_cast<int>(x + lane);
+    hn::StoreMaskBits(d, hn::Or(maxima, minima), bytes);
+    unsigned candidates = (bytes[0] | unsigned{bytes[1]} << 8) & ((1U << (next - x)) - 1);
+    for (; candidates != 0; candidates &= candidates - 1) {
+      const std::size_t column = x + static_cast<std::size_t>(std::countr_zero(candidates));
+      const float* at[9];
+      for (std::size_t i = 0; i < 9; ++i) at[i] = rows[i] + column;
+      if (is_extremum(at)) found[count++] = static_cast<int>(column);
     }
   }
   return count;
@@ -243,6 +254,7 @@ HWY_EXPORT(sum_rows_and_subtract);
 HWY_EXPORT(sum_block);
 HWY_EXPORT(bytes_to_floats);
 HWY_EXPORT(interleave_rows);
+HWY_EXPORT(ranges_of_columns);
 HWY_EXPORT(extrema_of_row);
 
 void symmetric_sum(const float* const* rows, std::size_t count, const float* weights,
@@ -270,9 +282,15 @@ void interleave(const float* even, const float* odd, std::size_t width, float* o
   HWY_DYNAMIC_DISPATCH(interleave_rows)(even, odd, width, out);
 }
 
-std::size_t find_extrema(const float* const* rows, std::size_t first, std::size_t last,
-                         float threshold, int* found) {
-  return HWY_DYNAMIC_DISPATCH(extrema_of_row)(rows, first, last, threshold, found);
+void column_ranges(const float* const* rows, std::size_t layers, std::size_t width,
+                   float* const* smallest, float* const* largest) {
+  HWY_DYNAMIC_DISPATCH(ranges_of_columns)(rows, layers, width, smallest, largest);
+}
+
+std::size_t find_extrema(const float* const* rows, const float* smallest, const float* largest,
+                         std::size_t first, std::size_t last, float threshold, int* found) {
+  return HWY_DYNAMIC_DISPATCH(extrema_of_row)(rows, smallest, largest, first, last, threshold,
+                                              found);
 }
 
 }  // namespace hybrid_slam::sift

@@ -36,10 +36,17 @@ void to_floats(const std::uint8_t* in, std::size_t width, float* out);
 // out[2 x] = even[x], out[2 x + 1] = odd[x], 2 * width samples.
 void interleave(const float* even, const float* odd, std::size_t width, float* out);
 
+// What the search for extrema compares a sample with, made once for a row of all layers: for layer
+// l = 0 .. layers - 1 the least and the largest of the nine samples in a column that three rows of
+// three differences hold, rows[3 * l] .. rows[3 * l + 8]. There are 3 * (layers + 2) rows.
+void column_ranges(const float* const* rows, std::size_t layers, std::size_t width,
+                   float* const* smallest, float* const* largest);
+
 // Columns x of first .. last - 1, ascending, whose neighbourhood (definition/extremum.h; rows[i]
-// points at column 0) is an extremum with |value| > threshold, which is not negative. `found` has
-// room for last - first columns; returns how many there are.
-std::size_t find_extrema(const float* const* rows, std::size_t first, std::size_t last,
-                         float threshold, int* found);
+// points at column 0) is an extremum with |value| > threshold, which is not negative. `smallest`
+// and `largest` are the ranges of the same nine rows. `found` has room for last - first columns;
+// returns how many there are.
+std::size_t find_extrema(const float* const* rows, const float* smallest, const float* largest,
+                         std::size_t first, std::size_t last, float threshold, int* found);
 
 }  // namespace hybrid_slam::sift

@@ -34,7 +34,10 @@ ScaleSpace::ScaleSpace(const SiftOptions& options)
     lags_.push_back(lags_.back() + whole_blocks(kernels_.back().reach()));
   }
   search_lag_ = lags_.back() + whole_blocks(kSearchReach);
-  pointers_.resize(kernels_.back().weights.size() + kBlockRows - 1);
+  pointers_.resize(std::max(kernels_.back().weights.size() + kBlockRows - 1,
+                            3 * static_cast<std::size_t>(layers_ + 2)));
+  smallest_.resize(static_cast<std::size_t>(layers_));
+  largest_.resize(smallest_.size());
 }
 
 ScaleSpace::Octave ScaleSpace::make_octave(int index) const {
@@ -71,7 +74,13 @@ void ScaleSpace::prepare(int width, int height) {
     if (side < kMinOctaveSize) break;
     octaves_.push_back(make_octave(index));
   }
-  columns_.resize(octaves_.empty() ? 0 : static_cast<std::size_t>(octaves_.front().width));
+  if (octaves_.empty()) return;
+  columns_.resize(static_cast<std::size_t>(octaves_.front().width));
+  ranges_.emplace(octaves_.front().width, 2 * layers_);
+  for (int layer = 0; layer < layers_; ++layer) {
+    smallest_[static_cast<std::size_t>(layer)] = ranges_->row(2 * layer);
+    largest_[static_cast<std::size_t>(layer)] = ranges_->row(2 * layer + 1);
+  }
 }
 
 const std::vector<Extremum>& ScaleSpace::detect(const GrayImage& image) {
@@ -145,15 +154,25 @@ void ScaleSpace::search_row(const Octave& octave, int y) {
   };
   const ExtremumLimits limits{layers_, octave.height, octave.width, contrast_threshold_,
                               edge_threshold_};
-  for (int layer = 1; layer <= layers_; ++layer) {
-    const float* rows[9];
-    rows_at(layer, y, 0, rows);
+  const auto layers = static_cast<std::size_t>(layers_);
+  for (std::size_t k = 0; k < octave.differences.size(); ++k) {
+    for (int i = 0; i < 3; ++i) {
+      pointers_[3 * k + static_cast<std::size_t>(i)] = octave.differences[k].row(y + i - 1);
+    }
+  }
+  column_ranges(pointers_.data(), layers, static_cast<std::size_t>(octave.width), smallest_.data(),
+                largest_.data());
+  for (std::size_t layer = 0; layer < layers; ++layer) {
     const std::size_t count =
-        find_extrema(rows, kBorder, static_cast<std::size_t>(octave.width - kBorder),
+        find_extrema(pointers_.data() + 3 * layer, smallest_[layer], largest_[layer], kBorder,
+                     static_cast<std::size_t>(octave.width - kBorder),
                      kSampleContrast * contrast_threshold_, columns_.data());
     for (std::size_t i = 0; i < count; ++i) {
       RefinedExtremum refined;
-      if (!refine_extremum(rows_at, limits, layer, y, columns_[i], &refined)) continue;
+      if (!refine_extremum(rows_at, limits, static_cast<int>(layer) + 1, y, columns_[i],
+                           &refined)) {
+        continue;
+      }
       refined_.push_back(refined);
     }
   }

@@ -69,6 +69,9 @@ class ScaleSpace {
   std::vector<Octave> octaves_;
   std::vector<const float*> pointers_;
   std::vector<int> columns_;
+  std::optional<RowStore> ranges_;  // around each sample of a row, per layer
+  std::vector<float*> smallest_;    // rows of it, by layer
+  std::vector<float*> largest_;
   std::vector<RefinedExtremum> refined_;  // of one octave
   std::vector<Extremum> extrema_;
 };

@@ -114,6 +114,10 @@ TEST_CASE("SIFT's extrema of a row are those of the definition, equal neighbours
       for (int i = 0; i < 9; ++i) rows.push_back(random_row(random, kWidth, trial % 2 ? 5 : 400));
       for (const auto& row : rows) pointers.push_back(row.data());
       const float threshold = trial % 2 ? 0.5F : 100.F;
+      std::vector<float> smallest(kWidth + kRowPadding), largest(smallest);
+      float* const least = smallest.data();
+      float* const most = largest.data();
+      column_ranges(pointers.data(), 1, kWidth, &least, &most);
       for (const std::size_t last : {6U, 100U, 225U}) {
         std::vector<int> expected, found(kWidth);
         for (std::size_t x = 5; x < last; ++x) {
@@ -123,7 +127,7 @@ TEST_CASE("SIFT's extrema of a row are those of the definition, equal neighbours
             expected.push_back(static_cast<int>(x));
           }
         }
-        found.resize(find_extrema(pointers.data(), 5, last, threshold, found.data()));
+        found.resize(find_extrema(pointers.data(), least, most, 5, last, threshold, found.data()));
         REQUIRE(found == expected);
         total += found.size();
       }
