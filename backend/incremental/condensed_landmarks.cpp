@@ -103,8 +103,10 @@ LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t
   const CondensedTerm::Member& of = term.members[member];
   LandmarkTerm landmark;
   landmark.base = inverse(pose_at(of.anchor)) * of.in_anchor.cast<double>();
-  for (const std::uint32_t observation : term.observations_of(member)) {
-    LandmarkView view;
+  const auto observations = term.observations_of(member);
+  landmark.views.reserve(observations.size());
+  for (const std::uint32_t observation : observations) {
+    LandmarkView& view = landmark.views.emplace_back();
     view.observation = observation;
     view.pose = poses_[observations_[view.observation].frame].variable;
     view.fixed = variables_[view.pose].fixed;
@@ -112,7 +114,6 @@ LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t
                            landmark.poses.end()) {
       landmark.poses.push_back(view.pose);
     }
-    landmark.views.push_back(view);
   }
   return landmark;
 }

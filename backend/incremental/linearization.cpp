@@ -123,21 +123,24 @@ double IncrementalSolver::linearize(LandmarkTerm& landmark, const Eigen::Vector3
   const Eigen::Vector3d start = carried_base(landmark);
   Eigen::Vector3d step = wanted - start;
   if (!step.allFinite()) step.setZero();
-  std::vector<LandmarkView> views = landmark.views;
-  std::vector<FactorView> factors = landmark.factors;
+  std::vector<char> had;  // the views and factors that could be used before
+  for (const LandmarkView& view : landmark.views) had.push_back(view.usable ? 1 : 0);
+  for (const FactorView& view : landmark.factors) had.push_back(view.usable ? 1 : 0);
   double cost = 0;
   const auto linearize_at = [&](const Eigen::Vector3d& at) {
     bool all = true;
     cost = 0;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      views[i].usable = linearize_view(at, views[i], cost);
-      all = all && (views[i].usable || !landmark.views[i].usable);
+    auto before = had.begin();
+    for (LandmarkView& view : landmark.views) {
+      view.usable = linearize_view(at, view, cost);
+      all = (view.usable || *before == 0) && all;
+      ++before;
     }
-    for (std::size_t i = 0; i < factors.size(); ++i) {
-      FactorView& view = factors[i];
+    for (FactorView& view : landmark.factors) {
       view.usable = linearize_factor(factors_[view.factor], &at, view.variables, view.offsets,
                                      view.rows, &view.by_point, cost);
-      all = all && (view.usable || !landmark.factors[i].usable);
+      all = (view.usable || *before == 0) && all;
+      ++before;
     }
     return all;
   };
@@ -153,8 +156,6 @@ double IncrementalSolver::linearize(LandmarkTerm& landmark, const Eigen::Vector3
   }
   landmark.base = start + step;
   landmark.held_back.setZero();
-  landmark.views = std::move(views);
-  landmark.factors = std::move(factors);
   landmark.anchor = LandmarkTerm::kNoAnchor;
   const auto anchor = std::find_if(landmark.poses.begin(), landmark.poses.end(),
                                    [this](std::uint32_t v) { return !variables_[v].is_block; });

@@ -152,21 +152,32 @@ void Map::move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world
   }
   std::vector<LandmarkId> changed;
   for (const auto& [id, pose] : cam_from_world) {
-    if (tables.keyframes.find(id.value) == nullptr) continue;
-    Keyframe& keyframe = tables.keyframes.edit(id.value);
-    keyframe.cam_from_world = pose;
-    for (const LandmarkId seen : keyframe.landmarks) {
+    Keyframe* const keyframe = tables.keyframes.edit_if(id.value);
+    if (keyframe == nullptr) continue;
+    keyframe->cam_from_world = pose;
+    for (const LandmarkId seen : keyframe->landmarks) {
       if (seen.valid()) changed.push_back(seen);
     }
   }
+  // Each landmark is looked up once: there are thousands, none of which is in a cache.
+  std::vector<std::pair<LandmarkId, const Eigen::Vector3d*>> places;
+  places.reserve(point_in_world.size());
   for (const auto& [id, point] : point_in_world) {
-    if (tables.landmarks.find(id.value) == nullptr) continue;
-    tables.landmarks.edit(id.value).point_in_world = point;
+    places.emplace_back(id, &point);
     changed.push_back(id);
   }
+  std::stable_sort(places.begin(), places.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
   std::sort(changed.begin(), changed.end());
   changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
-  for (const LandmarkId id : changed) update_geometry(tables, tables.landmarks.edit(id.value));
+  auto place = places.begin();
+  for (const LandmarkId id : changed) {
+    Landmark* const landmark = tables.landmarks.edit_if(id.value);
+    for (; place != places.end() && place->first == id; ++place) {
+      if (landmark != nullptr) landmark->point_in_world = *place->second;
+    }
+    if (landmark != nullptr) update_geometry(tables, *landmark);
+  }
 }
 
 void Map::set_camera(CameraId id, const Camera& camera) {

@@ -55,12 +55,19 @@ class PersistentTable {
   // The value, to be written. Throws std::out_of_range where there is none. Valid until the next
   // share().
   T& edit(std::uint64_t index) {
-    if (find(index) == nullptr) throw std::out_of_range("PersistentTable::edit: no such index");
+    T* const value = edit_if(index);
+    if (value == nullptr) throw std::out_of_range("PersistentTable::edit: no such index");
+    return *value;
+  }
+
+  // The same, or null where there is none.
+  T* edit_if(std::uint64_t index) {
+    if (find(index) == nullptr) return nullptr;
     std::shared_ptr<Node>* node = &root_;
     for (unsigned level = levels_; level-- > 0;) {
       node = &own<Inner>(*node).child[slot(index, level)];
     }
-    return own<Box>(*node).value;
+    return &own<Box>(*node).value;
   }
 
   // Throws std::logic_error if the index is taken.
