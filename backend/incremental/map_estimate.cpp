@@ -74,6 +74,7 @@ std::shared_ptr<const KeyframeCovariances> MapSmoother::covariances(const MapSna
 void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
                                      BundleResult& result) {
   const IncrementalOptions& options = options_.solver;
+  doubted_.clear();
   for (const LandmarkId id : map.at(newest).landmarks) {
     const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
     if (found == landmarks_.end()) continue;
@@ -85,9 +86,11 @@ void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
       }
       solver_->remove_observation(view.in_solver);
       result.outliers.push_back({id, view.seen});
+      doubted_.push_back(id);
       return true;  // forgotten: where the map takes it in again, it is a new one
     });
   }
+  std::sort(doubted_.begin(), doubted_.end());
 }
 
 void MapSmoother::write(const MapSnapshot& map, const std::vector<KeyframeId>& keyframes,

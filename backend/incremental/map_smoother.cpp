@@ -46,7 +46,9 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
   take_in_loops(*map);
   const std::vector<LandmarkId> changed =
       known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
-  for (const LandmarkId id : changed) take_in_landmark(*map, id);
+  for (const LandmarkId id : changed) {
+    if (known_map_ == nullptr || is_news(*map, id)) take_in_landmark(*map, id);
+  }
   take_in_odometry(*map);
   const UpdateSummary updated = solver_->update(stop);
 
@@ -177,6 +179,15 @@ void MapSmoother::take_in_odometry(const MapSnapshot& map, KeyframeId id) {
   known.edge = solver_->add_edge({pose_of_[id.value], pose_of_[odometry->previous.value],
                                   without_scale(constraint->a_from_b),
                                   constraint->information.topLeftCorner<6, 6>(), false});
+}
+
+// Not where a landmark has but moved, as most do that changed, unless views of it were set aside:
+// the map may have taken them in again.
+bool MapSmoother::is_news(const MapSnapshot& map, LandmarkId id) const {
+  const Landmark* before = known_map_->find(id);
+  const Landmark* now = map.find(id);
+  if (before == nullptr || now == nullptr || before->observations != now->observations) return true;
+  return std::binary_search(doubted_.begin(), doubted_.end(), id);
 }
 
 // Brings what the solver has of a landmark in line with the map.

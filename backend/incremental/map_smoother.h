@@ -93,6 +93,7 @@ class MapSmoother {
   double off_by(const Keyframe& keyframe) const;
   bool stayed(const Keyframe& keyframe) const;
   void take_in_loops(const MapSnapshot& map);
+  bool is_news(const MapSnapshot& map, LandmarkId id) const;
   void take_in_landmark(const MapSnapshot& map, LandmarkId id);
   void take_in_odometry(const MapSnapshot& map);
   void take_in_odometry(const MapSnapshot& map, KeyframeId id);
@@ -114,6 +115,7 @@ class MapSmoother {
   std::vector<KeyframeId> keyframe_of_;  // by pose
   std::vector<KeyframeId> gone_;         // keyframes whose poses the solver has still
   std::vector<std::uint32_t> behind_;    // poses of which the map has yet to be told; ascending
+  std::vector<LandmarkId> doubted_;      // whose views the last update set aside; ascending
   std::unordered_map<LandmarkId, KnownLandmark> landmarks_;
   std::unordered_map<KeyframeId, KnownOdometry> odometry_;
   std::vector<PoseConstraint> new_loops_;
