@@ -108,9 +108,9 @@ void MapSmoother::write(const MapSnapshot& map, const std::vector<KeyframeId>& k
 }
 
 // Of the keyframes behind the estimate those that the newest ones share landmarks with, at once.
-// Others wait for their turn, farthest off first: an update writes about as much of them as of what
-// is near, or each would cost as much as the whole map while a loop's last tenths of a millimetre
-// settle.
+// Others wait until they are off by more, which each update's noise does not do, and for their
+// turn, farthest off first: an update writes about as much of them as of what is near, or each
+// would cost as much as the whole map while a loop's last tenths of a millimetre settle.
 void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
                                  KeyframeId newest, bool all, BundleResult& result) {
   std::vector<KeyframeId> near = newest_and_neighbours(map);
@@ -121,6 +121,7 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
                  std::back_inserter(behind));
   std::vector<KeyframeId> at_once;
   std::vector<std::pair<double, KeyframeId>> others;
+  behind_.clear();
   for (const std::uint32_t pose : behind) {
     const Keyframe* keyframe = map.find(keyframe_of_[pose]);
     if (keyframe == nullptr) continue;
@@ -128,6 +129,8 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
     if (!(off > options_.min_motion)) continue;
     if (all || std::binary_search(near.begin(), near.end(), keyframe->id)) {
       at_once.push_back(keyframe->id);
+    } else if (off <= options_.min_far_motion) {
+      behind_.push_back(pose);
     } else {
       others.emplace_back(-off, keyframe->id);
     }
@@ -138,7 +141,6 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
   std::size_t enough = 0;
   for (const KeyframeId id : near) enough += map.at(id).landmarks.size();
   std::vector<KeyframeId> next;
-  behind_.clear();
   for (std::size_t i = 0, seen = 0; i < others.size(); ++i) {
     const KeyframeId id = others[i].second;
     seen += map.at(id).landmarks.size();

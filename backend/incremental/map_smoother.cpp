@@ -28,6 +28,7 @@ bool say_the_same(const Odometry* a, const Odometry* b) {
 
 std::string MapSmootherOptions::validate() const {
   if (!(min_motion >= 0)) return "min_motion must not be negative";
+  if (!(min_far_motion >= min_motion)) return "min_far_motion must not be less than min_motion";
   return solver.validate();
 }
 

@@ -19,6 +19,9 @@ struct MapSmootherOptions {
   IncrementalOptions solver;
   // Poses of the map follow the estimate once they are off by more [m, rad].
   double min_motion = 1e-5;
+  // The same of those that share no landmark with the newest: a tenth of a pixel in an image. All
+  // but a rest is noise of the estimate, which comes and goes.
+  double min_far_motion = 1e-4;
 
   MapSmootherOptions() {
     solver.loss = Loss::kHuber;

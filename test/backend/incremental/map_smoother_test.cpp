@@ -302,6 +302,17 @@ TEST_CASE("What moves far from the newest keyframes is told by and by, and at on
     CHECK(behind == 0);
     CHECK(updates > 1);
   }
+  SECTION("not of a twentieth of a millimetre, but when asked") {
+    take_in(smoother.rest(filled.map.view()));
+    for (auto& [id, pose] : aside) {
+      pose = filled.map.view().at(id).cam_from_world;
+      if (!is_near(id)) pose.params.tail<3>() += 5e-5 * Eigen::Vector3d::Unit(id.value % 3);
+    }
+    filled.map.move(aside, {});
+    const BundleResult next = take_in(smoother.update(filled.map.snapshot(), newest));
+    for (const auto& [id, pose] : next.cam_from_world) CHECK(is_near(id));
+    CHECK(smoother.rest(filled.map.view()).cam_from_world.size() > filled.keyframes.size() / 4);
+  }
   SECTION("at once, but for what others have moved meanwhile") {
     KeyframeId moved;
     for (const KeyframeId id : filled.keyframes) {
