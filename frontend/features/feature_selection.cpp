@@ -18,6 +18,31 @@ bool inside(const Keypoint& keypoint, int width, int height) {
 
 auto strength(const Keypoint& k) { return std::tuple(-k.response, k.y, k.x, k.scale, k.angle); }
 
+// Those inside the image. The response, which decides nearly always, stands beside what is sorted.
+std::vector<int> by_strength(const std::vector<Keypoint>& keypoints, int width, int height) {
+  struct Ranked {
+    float response;
+    int index;
+  };
+  std::vector<Ranked> ranked;
+  ranked.reserve(keypoints.size());
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    if (!inside(keypoints[i], width, height)) continue;
+    ranked.push_back({keypoints[i].response, static_cast<int>(i)});
+  }
+  const auto at = [&](const Ranked& one) -> const Keypoint& {
+    return keypoints[static_cast<std::size_t>(one.index)];
+  };
+  std::sort(ranked.begin(), ranked.end(), [&](const Ranked& a, const Ranked& b) {
+    if (a.response != b.response) return a.response > b.response;
+    return strength(at(a)) < strength(at(b));
+  });
+  std::vector<int> order;
+  order.reserve(ranked.size());
+  for (const Ranked& one : ranked) order.push_back(one.index);
+  return order;
+}
+
 // The largest quota to which cells can be filled up, from what they have, with no more than
 // `max_count` in all.
 int largest_quota(const std::vector<int>& available, const std::vector<int>& taken, int max_count) {
@@ -42,14 +67,8 @@ int largest_quota(const std::vector<int>& available, const std::vector<int>& tak
 
 std::vector<int> select_spread(const std::vector<Keypoint>& keypoints, int width, int height,
                                int max_count) {
-  std::vector<int> order;
-  order.reserve(keypoints.size());
-  for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    if (inside(keypoints[i], width, height)) order.push_back(static_cast<int>(i));
-  }
   const auto at = [&](int i) -> const Keypoint& { return keypoints[static_cast<std::size_t>(i)]; };
-  std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return strength(at(a)) < strength(at(b)); });
+  const std::vector<int> order = by_strength(keypoints, width, height);
   if (std::ssize(order) <= max_count) return order;
 
   const SpreadGrid grid = make_spread_grid(width, height, max_count);
