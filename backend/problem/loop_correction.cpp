@@ -124,12 +124,15 @@ void carry_the_rest(const MapSnapshot& now, BundleResult& result) {
 }
 
 void carry_newcomers(const MapSnapshot& then, const MapSnapshot& now, BundleResult& result) {
-  if (now.next_keyframe_id() == then.next_keyframe_id()) return;
+  const KeyframeId first = then.next_keyframe_id();
+  if (now.next_keyframe_id() == first) return;
   Moves moves = moves_of(now, result);
-  for (const KeyframeId id : now.keyframe_ids_from(then.next_keyframe_id())) {
-    const auto above = moves.find(now.at(id).parent);
-    if (above == moves.end()) continue;
-    const Rigid3d new_from_old = above->second;
+  for (const KeyframeId id : now.keyframe_ids_from(first)) {
+    // Where a keyframe was erased meanwhile, one may hang from one that is newer.
+    KeyframeId above = now.at(id).parent;
+    while (above >= first && !moves.contains(above)) above = now.at(above).parent;
+    if (!moves.contains(above)) continue;
+    const Rigid3d new_from_old = moves.at(above);
     result.cam_from_world.emplace_back(id, now.at(id).cam_from_world * inverse(new_from_old));
     moves.emplace(id, new_from_old);
   }
