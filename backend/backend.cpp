@@ -131,14 +131,15 @@ void Backend::shift_disparities(CameraId camera, double by, KeyframeId first) {
 }
 
 BundleSummary Backend::optimize_local(KeyframeId newest, const std::stop_token& stop) {
-  LocalUpdate update = begin_local(newest);
+  LocalUpdate update = begin_local({&newest, 1});
   update.run(stop);
   return end_local(std::move(update));
 }
 
-LocalUpdate Backend::begin_local(KeyframeId newest) {
+LocalUpdate Backend::begin_local(std::span<const KeyframeId> newest) {
   require_no_update("begin_local");
-  LocalUpdate update(snapshot(), newest);
+  if (newest.empty()) throw std::logic_error("Backend::begin_local: no keyframe");
+  LocalUpdate update(snapshot(), {newest.begin(), newest.end()});
   update.local_ = options_.local;
   if (options_.local_method == LocalMethod::kIncremental) update.smoother_ = &smoother();
   updating_ = true;
@@ -155,6 +156,7 @@ void LocalUpdate::run(const std::stop_token& stop) {
 }
 
 BundleSummary Backend::end_local(LocalUpdate update) {
+  if (!updating_) throw std::logic_error("Backend::end_local: no local update was begun");
   updating_ = false;
   carry_newcomers(*update.map_, view(), update.result_);
   BundleSummary summary = take_in(std::move(update.result_));

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -78,10 +79,11 @@ class Backend {
   // when stopped.
   BundleSummary optimize_local(KeyframeId newest, const std::stop_token& stop = {});
 
-  // The same in steps, so that the work can be done beside. Between the two keyframes may be added
-  // and edits applied: what came since is carried along. All that moves the map or renumbers
-  // keypoints has to wait for end_local(): std::logic_error.
-  LocalUpdate begin_local(KeyframeId newest);
+  // The same in steps, so that the work can be done beside; `newest`: the keyframes that came since
+  // the last time, ascending, at least one. Between the two keyframes may be added and edits
+  // applied: what came since is carried along. All that moves the map or renumbers keypoints has to
+  // wait for end_local(): std::logic_error.
+  LocalUpdate begin_local(std::span<const KeyframeId> newest);
   BundleSummary end_local(LocalUpdate update);
 
   // Takes in what optimize_local() found far from the newest keyframes and has left for later.

@@ -2,6 +2,8 @@
 
 #include <memory>
 #include <stop_token>
+#include <utility>
+#include <vector>
 
 #include "backend/map/map_snapshot.h"
 #include "backend/problem/local_bundle.h"
@@ -11,7 +13,7 @@ namespace hybrid_slam {
 
 class MapSmoother;
 
-// The map optimised around its newest keyframe, by steps: Backend::begin_local() makes it of a
+// The map optimised around its newest keyframes, by steps: Backend::begin_local() makes it of a
 // snapshot, run() works in any thread while the backend takes in keyframes, and
 // Backend::end_local() takes it in. The backend must outlive run().
 class LocalUpdate {
@@ -23,12 +25,12 @@ class LocalUpdate {
 
  private:
   friend class Backend;
-  LocalUpdate(std::shared_ptr<const MapSnapshot> map, KeyframeId newest)
-      : map_(std::move(map)), newest_(newest) {}
+  LocalUpdate(std::shared_ptr<const MapSnapshot> map, std::vector<KeyframeId> newest)
+      : map_(std::move(map)), newest_(std::move(newest)) {}
 
   std::shared_ptr<const MapSnapshot> map_;
-  KeyframeId newest_;
-  MapSmoother* smoother_ = nullptr;  // or null: bundle adjustment of the keyframe's surroundings
+  std::vector<KeyframeId> newest_;
+  MapSmoother* smoother_ = nullptr;  // or null: bundle adjustment of the keyframes' surroundings
   LocalBundleOptions local_;
   BundleResult result_;
   std::shared_ptr<const KeyframeCovariances> covariances_;

@@ -63,7 +63,7 @@ KeyframeId LocalMapping::process(const MappingJob& job, StageTimes& times,
                                  const std::function<void()>& publish) {
   const KeyframeId id = insert(job, times);
   publish();
-  LocalUpdate update = begin_update(id);
+  LocalUpdate update = begin_update({&id, 1});
   update.run();
   end_update(std::move(update), {&id, 1}, times);
   publish();
@@ -144,7 +144,7 @@ LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
                                 const std::function<void()>& publish) {
   const LoopOutcome outcome = move_to(loop, times);
   if (outcome.end != LoopEnd::kClosed) return outcome;
-  LocalUpdate update = begin_update(loop.keyframe);
+  LocalUpdate update = begin_update({&loop.keyframe, 1});
   update.run();
   end_update(std::move(update), {}, times);
   fuse_sides(loop, times);

@@ -70,8 +70,10 @@ class LocalMapping {
   // an update works if moves_the_map(job).
   KeyframeId insert(const MappingJob& job, StageTimes& times);
   bool moves_the_map(const MappingJob& job) const;
-  // The map is optimised, beside: see LocalUpdate.
-  LocalUpdate begin_update(KeyframeId newest) { return backend_.begin_local(newest); }
+  // The map is optimised around these, beside: see LocalUpdate.
+  LocalUpdate begin_update(std::span<const KeyframeId> newest) {
+    return backend_.begin_local(newest);
+  }
   // Takes that in, and culls what these new keyframes make redundant.
   void end_update(LocalUpdate update, std::span<const KeyframeId> added, StageTimes& times);
 

@@ -70,23 +70,29 @@ void MappingWorker::take(UpdateDone&) {
 void MappingWorker::go_on() {
   while (!updating_ && (!moves_.empty() || !inserted_.empty())) {
     if (!moves_.empty()) {
-      Move move = std::move(moves_.front());
-      moves_.pop_front();
-      std::visit([this](auto& one) { run(one); }, move);
+      next_move();
     } else {
       in_update_ = std::exchange(inserted_, {});
-      begin_update(newest_left());
+      begin_update(still_there());
     }
   }
 }
 
-// Of those that were added, unless all were culled meanwhile; then of the map.
-KeyframeId MappingWorker::newest_left() const {
+void MappingWorker::next_move() {
+  Move move = std::move(moves_.front());
+  moves_.pop_front();
+  std::visit([this](auto& one) { run(one); }, move);
+}
+
+// Of those that were added; if all were culled meanwhile, the map's newest one.
+std::vector<KeyframeId> MappingWorker::still_there() const {
   const MapSnapshot& map = mapping_.map().view();
-  for (auto one = in_update_.rbegin(); one != in_update_.rend(); ++one) {
-    if (map.find(one->id) != nullptr) return one->id;
+  std::vector<KeyframeId> ids;
+  for (const KeyframeResult& one : in_update_) {
+    if (map.find(one.id) != nullptr) ids.push_back(one.id);
   }
-  return map.keyframe_ids().back();
+  if (ids.empty()) ids.push_back(map.keyframe_ids().back());
+  return ids;
 }
 
 void MappingWorker::run(LoopMeasurement& loop) {
@@ -97,7 +103,7 @@ void MappingWorker::run(LoopMeasurement& loop) {
   }
   publish();
   closing_.emplace(std::move(loop), outcome);
-  begin_update(closing_->first.keyframe);
+  begin_update({closing_->first.keyframe});
 }
 
 void MappingWorker::run(FullCorrection& correction) {
@@ -107,7 +113,7 @@ void MappingWorker::run(FullCorrection& correction) {
   events_.adjusted(snapshot());
 }
 
-void MappingWorker::begin_update(KeyframeId newest) {
+void MappingWorker::begin_update(const std::vector<KeyframeId>& newest) {
   LocalUpdate update = mapping_.begin_update(newest);
   if (updates_) {
     updating_ = true;

@@ -101,10 +101,11 @@ class MappingWorker {
   void take(FullCorrection& correction) { moves_.emplace_back(std::move(correction)); }
   void take(UpdateDone&);
   void go_on();
+  void next_move();
   void run(LoopMeasurement& loop);
   void run(FullCorrection& correction);
-  KeyframeId newest_left() const;
-  void begin_update(KeyframeId newest);
+  std::vector<KeyframeId> still_there() const;
+  void begin_update(const std::vector<KeyframeId>& newest);
   void end_update(LocalUpdate update);
 
   LocalMapping& mapping_;

@@ -112,9 +112,10 @@ void MapSmoother::write(const MapSnapshot& map, const std::vector<KeyframeId>& k
 // turn, farthest off first: an update writes about as much of them as of what is near, or each
 // would cost as much as the whole map while a loop's last tenths of a millimetre settle.
 void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
-                                 KeyframeId newest, bool all, BundleResult& result) {
+                                 std::span<const KeyframeId> newest, bool all,
+                                 BundleResult& result) {
   std::vector<KeyframeId> near = newest_and_neighbours(map);
-  near.push_back(newest);
+  near.insert(near.end(), newest.begin(), newest.end());
   std::sort(near.begin(), near.end());
   std::vector<std::uint32_t> behind;
   std::set_union(behind_.begin(), behind_.end(), moved.begin(), moved.end(),
@@ -135,7 +136,7 @@ void MapSmoother::write_estimate(const MapSnapshot& map, const std::vector<std::
       others.emplace_back(-off, keyframe->id);
     }
   }
-  write(map, at_once, map.at(newest).landmarks, result);
+  write(map, at_once, seen_by(map, {newest.begin(), newest.end()}, {}), result);
 
   std::sort(others.begin(), others.end());
   std::size_t enough = 0;

@@ -37,13 +37,13 @@ MapSmoother::MapSmoother(const MapSmootherOptions& options)
 
 MapSmoother::~MapSmoother() = default;
 
-BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
-                                 const std::stop_token& stop) {
+BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map,
+                                 std::span<const KeyframeId> newest, const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
   // A loop, or a map that is new to the smoother, is worth telling all of it at once.
   const bool tell_all = known_map_ == nullptr || !new_loops_.empty();
   follow_moves(*map);
-  take_in_keyframes(*map, newest);
+  take_in_keyframes(*map, newest.back());
   take_in_loops(*map);
   const std::vector<LandmarkId> changed =
       known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
@@ -55,7 +55,7 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map, Keyfram
 
   forget_marginalized(*map, updated.marginalized);
   BundleResult result;
-  set_outliers_aside(*map, newest, result);
+  for (const KeyframeId id : newest) set_outliers_aside(*map, id, result);
   write_estimate(*map, updated.moved, newest, tell_all, result);
   let_keyframes_go(*map);
   known_map_ = std::move(map);

@@ -5,6 +5,7 @@
 #include <span>
 #include <stop_token>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "backend/incremental/incremental_options.h"
@@ -49,13 +50,18 @@ class MapSmoother {
   // still, ascending. To be called each time, before the update that sees it.
   void renumber(KeyframeId keyframe, std::span<const std::uint32_t> kept);
 
-  // The map as it is now, with `newest` in it. The result holds what moved, far from the newest
-  // keyframes as much of it as near them (rest() has what is left; after a loop nothing is), and as
-  // outliers the observations beyond their threshold of the landmarks that `newest` sees: they are
-  // out of the smoother's problem, and the map is to follow.
+  // The map as it is now, with `newest` in it: the keyframes that came since the last update,
+  // ascending, at least one. The result holds what moved, far from the newest keyframes as much of
+  // it as near them (rest() has what is left; after a loop nothing is), and as outliers the
+  // observations beyond their threshold of the landmarks that `newest` see: they are out of the
+  // smoother's problem, and the map is to follow.
   // `stop`: see IncrementalSolver::update.
-  BundleResult update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
+  BundleResult update(std::shared_ptr<const MapSnapshot> map, std::span<const KeyframeId> newest,
                       const std::stop_token& stop = {});
+  BundleResult update(std::shared_ptr<const MapSnapshot> map, KeyframeId newest,
+                      const std::stop_token& stop = {}) {
+    return update(std::move(map), {&newest, 1}, stop);
+  }
 
   // What results have yet to say of keyframes that moved, all of it; to be taken in before others
   // move the map, and at the end. `map`: the last update's, with what came since.
@@ -107,7 +113,7 @@ class MapSmoother {
   void write(const MapSnapshot& map, const std::vector<KeyframeId>& keyframes,
              std::vector<LandmarkId> seen, BundleResult& result);
   void write_estimate(const MapSnapshot& map, const std::vector<std::uint32_t>& moved,
-                      KeyframeId newest, bool all, BundleResult& result);
+                      std::span<const KeyframeId> newest, bool all, BundleResult& result);
   void forget_marginalized(const MapSnapshot& map, const std::vector<std::uint32_t>& poses);
 
   MapSmootherOptions options_;

@@ -50,17 +50,22 @@ std::vector<KeyframeId> outer_observers(const MapSnapshot& map,
 
 }  // namespace
 
-ProblemConfig make_local_bundle(const MapSnapshot& map, KeyframeId around,
+ProblemConfig make_local_bundle(const MapSnapshot& map, std::span<const KeyframeId> around,
                                 const LocalBundleOptions& options) {
   ProblemConfig config;
   config.options = options.problem;
-  if (map.find(around) == nullptr) return config;
-  std::vector<KeyframeId> inner{around};
-  for (const Covisible& edge :
-       map.covisible(around, options.min_shared_landmarks, options.max_neighbours)) {
-    inner.push_back(edge.id);
+  std::vector<KeyframeId> inner;
+  for (const KeyframeId id : around) {
+    const Keyframe* keyframe = map.find(id);
+    if (keyframe == nullptr) continue;
+    inner.push_back(id);
+    for (const Covisible& edge :
+         map.covisible(id, options.min_shared_landmarks, options.max_neighbours)) {
+      inner.push_back(edge.id);
+    }
+    if (keyframe->odometry != nullptr) inner.push_back(keyframe->odometry->previous);
   }
-  if (const auto& odometry = map.at(around).odometry) inner.push_back(odometry->previous);
+  if (inner.empty()) return config;
   sort_unique(inner);
   config.variable_landmarks = landmarks_seen_by(map, inner);
   config.fixed_poses = outer_observers(map, config.variable_landmarks, inner, options.max_fixed);

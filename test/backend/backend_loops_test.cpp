@@ -161,13 +161,13 @@ TEST_CASE("backend: an adjustment of everything is carried over a loop that was 
 TEST_CASE("backend: what comes in while a local update works is carried along") {
   Backend backend(chain_backend());
   OpenCircle circle(backend);
-  LocalUpdate update = backend.begin_local(circle.keyframes.back());
+  LocalUpdate update = backend.begin_local(std::vector{circle.keyframes.back()});
   const auto began = backend.snapshot();
   circle.second.assign(circle.second.size(), LandmarkId());
   circle.add(25);  // once more, and all that it sees is new
   const KeyframeId newcomer = circle.keyframes.back();
   const auto before = backend.snapshot();
-  CHECK_THROWS_AS(backend.begin_local(newcomer), std::logic_error);
+  CHECK_THROWS_AS(backend.optimize_local(newcomer), std::logic_error);
   CHECK_THROWS_AS(backend.close(circle.loop()), std::logic_error);
   CHECK_THROWS_AS(backend.take_in_full({}, 0), std::logic_error);
   CHECK_THROWS_AS(backend.catch_up(), std::logic_error);
