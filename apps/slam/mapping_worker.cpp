@@ -51,12 +51,14 @@ void MappingWorker::work() {
   } catch (...) {
     failure_ = std::current_exception();
     tasks_.close();
+    while (tasks_.pop()) {  // so that has_room(), and who adds the next keyframe learns of it
+    }
   }
   snapshots_.close();
 }
 
 void MappingWorker::take(MappingJob& job) {
-  if (updating_ && mapping_.moves_the_map(job)) end_update(updates_->take());
+  if (mapping_.moves_the_map(job)) settle();
   const KeyframeId id = mapping_.insert(job, times_);
   publish();
   inserted_.push_back({job.camera, job.frame_index(), id});
@@ -74,6 +76,17 @@ void MappingWorker::go_on() {
     } else {
       in_update_ = std::exchange(inserted_, {});
       begin_update(still_there());
+    }
+  }
+}
+
+// What was measured in the map as it is comes to its end before that changes size.
+void MappingWorker::settle() {
+  while (updating_ || !moves_.empty()) {
+    if (updating_) {
+      end_update(updates_->take());
+    } else {
+      next_move();
     }
   }
 }

@@ -101,6 +101,7 @@ class MappingWorker {
   void take(FullCorrection& correction) { moves_.emplace_back(std::move(correction)); }
   void take(UpdateDone&);
   void go_on();
+  void settle();
   void next_move();
   void run(LoopMeasurement& loop);
   void run(FullCorrection& correction);
