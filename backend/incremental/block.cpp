@@ -53,32 +53,51 @@ void Block::fold(const Eigen::VectorXd& delta) {
   }
 }
 
-Eigen::VectorXd Block::in_world(Eigen::VectorXd values, const Eigen::Matrix3d& rotation) const {
+void Block::write(const Eigen::Map<const Eigen::VectorXd>& delta, const Eigen::Matrix3d& rotation,
+                  double* to) const {
+  Eigen::Map<Eigen::VectorXd> values(to, inner.size());
+  values = inner;
+  if (delta != folded_delta) {
+    if (given.manifold == nullptr) {
+      values += delta - folded_delta;
+    } else {
+      values = moved(delta - folded_delta);
+    }
+  }
   for (const int start : given.world_vectors) {
     values.segment<3>(start) = (rotation.transpose() * values.segment<3>(start)).eval();
   }
-  return values;
 }
 
-Eigen::MatrixXd Block::by_increment(const Eigen::MatrixXd& by_world,
-                                    const Eigen::Matrix3d& rotation) const {
-  Eigen::MatrixXd result = by_world;
+// A row at a time: of so few numbers that products of any size would take longer to set up.
+void Block::turn(Eigen::Ref<Rows> by_world, const Eigen::Matrix3d& rotation) const {
   for (const int start : given.world_vectors) {
-    result.middleCols<3>(start) = by_world.middleCols<3>(start) * rotation.transpose();
+    for (Eigen::Index row = 0; row < by_world.rows(); ++row) {
+      by_world.block<1, 3>(row, start) =
+          (by_world.block<1, 3>(row, start) * rotation.transpose()).eval();
+    }
   }
-  return basis.size() == 0 ? result : Eigen::MatrixXd(result * basis);
+}
+
+void Block::add_by_increment(const Eigen::Ref<const Rows>& by_inner,
+                             Eigen::Ref<Eigen::MatrixXd> by_increment) const {
+  if (basis.size() == 0) {
+    by_increment += by_inner;
+  } else {
+    by_increment.noalias() += by_inner * basis;
+  }
 }
 
 // With v = R^T inner and R <- R exp(turn): v <- v - turn x v.
-Eigen::Matrix<double, Eigen::Dynamic, 3> Block::by_turn(const Eigen::MatrixXd& by_world,
-                                                        const Eigen::VectorXd& in_world) const {
-  Eigen::Matrix<double, Eigen::Dynamic, 3> result =
-      Eigen::Matrix<double, Eigen::Dynamic, 3>::Zero(by_world.rows(), 3);
+void Block::add_by_turn(const Eigen::Ref<const Rows>& by_world,
+                        const Eigen::Map<const Eigen::VectorXd>& in_world,
+                        Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, 3>> by_turn) const {
   for (const int start : given.world_vectors) {
-    result.noalias() +=
-        by_world.middleCols<3>(start) * hat(Eigen::Vector3d(in_world.segment<3>(start)));
+    const Eigen::Matrix3d turned = hat(Eigen::Vector3d(in_world.segment<3>(start)));
+    for (Eigen::Index row = 0; row < by_world.rows(); ++row) {
+      by_turn.row(row) += by_world.block<1, 3>(row, start) * turned;
+    }
   }
-  return result;
 }
 
 }  // namespace hybrid_slam

@@ -32,15 +32,21 @@ struct Block {
   // Makes what happened since the last time part of the estimate.
   void fold(const Eigen::VectorXd& delta);
 
-  // Between the carrier's axes and the world's; `rotation` as above.
-  Eigen::VectorXd in_world(Eigen::VectorXd values, const Eigen::Matrix3d& rotation) const;
+  // Writes the values in the world that belong to a delta; `rotation` as above.
+  void write(const Eigen::Map<const Eigen::VectorXd>& delta, const Eigen::Matrix3d& rotation,
+             double* values) const;
 
-  // Takes a derivative by the values in the world to that by an increment of the block, and adds
-  // what a turn of the carrier, along the world's axes, does to it by way of the block.
-  Eigen::MatrixXd by_increment(const Eigen::MatrixXd& by_world,
-                               const Eigen::Matrix3d& rotation) const;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> by_turn(const Eigen::MatrixXd& by_world,
-                                                   const Eigen::VectorXd& in_world) const;
+  // Derivatives by the values, a row each.
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  // Takes those by the values in the world to those by the values in the carrier's axes, in place.
+  void turn(Eigen::Ref<Rows> by_world, const Eigen::Matrix3d& rotation) const;
+  // Adds the derivatives by an increment of the block, from those in the carrier's axes.
+  void add_by_increment(const Eigen::Ref<const Rows>& by_inner,
+                        Eigen::Ref<Eigen::MatrixXd> by_increment) const;
+  // Adds what a turn of the carrier, along the world's axes, does by way of the block.
+  void add_by_turn(const Eigen::Ref<const Rows>& by_world,
+                   const Eigen::Map<const Eigen::VectorXd>& in_world,
+                   Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, 3>> by_turn) const;
 
  private:
   Eigen::VectorXd moved(const Eigen::VectorXd& increment) const;

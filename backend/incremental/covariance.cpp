@@ -38,12 +38,17 @@ IncrementalSolver::Dependence IncrementalSolver::dependence_of(const GraphVariab
     const Eigen::Index size = block.inner.size();
     result.own = Eigen::MatrixXd::Zero(size, size);
     if (variables_[block.variable].fixed) return result;
-    const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
+    const Block::Rows identity = Block::Rows::Identity(size, size);
+    Block::Rows by_inner = identity;
+    block.turn(by_inner, carrier_rotation(block));
+    Eigen::MatrixXd by_increment = Eigen::MatrixXd::Zero(size, block.tangent_size());
+    block.add_by_increment(by_inner, by_increment);
     result.on.push_back(block.variable);
-    result.by_delta.push_back(block.by_increment(identity, carrier_rotation(block)));
+    result.by_delta.push_back(std::move(by_increment));
     if (block.given.world_vectors.empty() || variables_[block.carrier].fixed) return result;
     Eigen::MatrixXd by_carrier = Eigen::MatrixXd::Zero(size, 6);
-    by_carrier.rightCols<3>() = block.by_turn(identity, this->block(given.index));
+    const Eigen::VectorXd values = this->block(given.index);
+    block.add_by_turn(identity, {values.data(), size}, by_carrier.rightCols<3>());
     result.on.push_back(block.carrier);
     result.by_delta.push_back(std::move(by_carrier));
   } else {

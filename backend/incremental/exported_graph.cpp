@@ -130,6 +130,7 @@ double IncrementalSolver::cost() const {
     if (!factor.there) continue;
     Eigen::Vector3d at = Eigen::Vector3d::Zero();
     if (factor.point != kNone) at = point(factor.point);
+    residual.resize(factor.function->num_residuals());
     if (factor_residual(factor, &at, residual)) sum += residual.squaredNorm();
   }
   return sum / 2;

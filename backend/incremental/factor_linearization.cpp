@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "backend/incremental/incremental_solver.h"
+#include "backend/incremental/scratch.h"
 
 // What an IncrementalSolver asks its factors of any kind, and its priors.
 
@@ -16,38 +18,68 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 // Squared mismatch of a factor whose function fails.
 constexpr double kNoResult = 1e6;
 
+// Of a factor that is not unusually large: its variables and their numbers, its rows, and all
+// numbers of its Jacobians.
+constexpr std::size_t kVariables = 8;
+constexpr std::size_t kNumbers = 48;
+constexpr std::size_t kRows = 16;
+constexpr std::size_t kDerivatives = 512;
+
+std::size_t sum_of(const std::vector<int>& sizes) {
+  return static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), 0));
+}
+
+// residual -= columns * delta: few rows, which a general product would spend most of its time on.
+void subtract(const Eigen::MatrixXd& jacobian, Eigen::Index first,
+              const Eigen::Map<const Eigen::VectorXd>& delta, Eigen::Ref<Eigen::VectorXd> residual) {
+  for (Eigen::Index i = 0; i < delta.size(); ++i) residual -= delta[i] * jacobian.col(first + i);
+}
+
 }  // namespace
 
 // The values of a factor's variables, in its order.
-struct IncrementalSolver::Arguments {
-  std::vector<double> values;
-  std::vector<const double*> blocks;
+class IncrementalSolver::Arguments {
+ public:
+  Arguments(const IncrementalSolver& solver, const Factor& factor, const Eigen::Vector3d* point)
+      : values_(sum_of(factor.function->parameter_block_sizes())),
+        blocks_(factor.given.variables.size()) {
+    double* next = values_.data();
+    const double** block = blocks_.data();
+    for (const GraphVariable& variable : factor.given.variables) {
+      *block++ = next;
+      next = solver.write_value(variable, point, next);
+    }
+  }
+
+  const double* const* blocks() const { return blocks_.data(); }
+
+ private:
+  Scratch<double, kNumbers> values_;
+  Scratch<const double*, kVariables> blocks_;
 };
 
-IncrementalSolver::Arguments IncrementalSolver::arguments(const Factor& factor,
-                                                          const Eigen::Vector3d* at) const {
-  Arguments result;
-  const auto append = [&](const auto& values) {
-    result.values.insert(result.values.end(), values.data(), values.data() + values.size());
-  };
-  for (const GraphVariable& variable : factor.given.variables) {
-    if (variable.kind == GraphVariable::Kind::kPose) append(pose(variable.index).params);
-    if (variable.kind == GraphVariable::Kind::kPoint) append(*at);
-    if (variable.kind == GraphVariable::Kind::kBlock) append(block(variable.index));
+// Returns where the next value goes.
+double* IncrementalSolver::write_value(const GraphVariable& variable, const Eigen::Vector3d* point,
+                                       double* to) const {
+  if (variable.kind == GraphVariable::Kind::kPoint) {
+    return std::copy_n(point->data(), 3, to);
   }
-  const double* next = result.values.data();
-  for (const int size : factor.function->parameter_block_sizes()) {
-    result.blocks.push_back(next);
-    next += size;
+  if (variable.kind == GraphVariable::Kind::kPose) {
+    const Rigid3d pose = pose_at(poses_[variable.index].variable);
+    return std::copy_n(pose.params.data(), pose.params.size(), to);
   }
-  return result;
+  const Block& block = blocks_[variable.index];
+  const auto size = block.inner.size();
+  if (variables_[block.variable].fixed) return std::copy_n(block.given.values.data(), size, to);
+  block.write(tree_.delta_of(block.variable), carrier_rotation(block), to);
+  return to + size;
 }
 
 bool IncrementalSolver::factor_residual(const Factor& factor, const Eigen::Vector3d* at,
-                                        Eigen::VectorXd& residual) const {
-  residual.setZero(factor.function->num_residuals());
-  const Arguments given = arguments(factor, at);
-  return factor.function->Evaluate(given.blocks.data(), residual.data(), nullptr) &&
+                                        Eigen::Ref<Eigen::VectorXd> residual) const {
+  residual.setZero();
+  const Arguments given(*this, factor, at);
+  return factor.function->Evaluate(given.blocks(), residual.data(), nullptr) &&
          residual.allFinite();
 }
 
@@ -59,16 +91,17 @@ bool IncrementalSolver::linearize_factor(const Factor& factor, const Eigen::Vect
                                          double& cost) const {
   const int count = factor.function->num_residuals();
   const std::vector<int>& sizes = factor.function->parameter_block_sizes();
-  const Arguments given = arguments(factor, at);
-  std::vector<RowMajor> by_argument;
-  std::vector<double*> jacobians;
-  by_argument.reserve(sizes.size());
-  for (const int size : sizes) {
-    jacobians.push_back(by_argument.emplace_back(count, size).data());
+  const Arguments given(*this, factor, at);
+  Scratch<double, kDerivatives> derivatives(static_cast<std::size_t>(count) * sum_of(sizes));
+  Scratch<double*, kVariables> jacobians(sizes.size());
+  double* next = derivatives.data();
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    jacobians.data()[k] = next;
+    next += count * sizes[k];
   }
   rows.residual.setZero(count);
   rows.jacobian.setZero(count, offsets.back());
-  if (!factor.function->Evaluate(given.blocks.data(), rows.residual.data(), jacobians.data()) ||
+  if (!factor.function->Evaluate(given.blocks(), rows.residual.data(), jacobians.data()) ||
       !rows.residual.allFinite()) {
     return false;
   }
@@ -78,30 +111,32 @@ bool IncrementalSolver::linearize_factor(const Factor& factor, const Eigen::Vect
                                     : offsets[static_cast<std::size_t>(found - variables.begin())];
   };
   for (std::size_t k = 0; k < sizes.size(); ++k) {
-    if (!by_argument[k].allFinite()) return false;
+    Eigen::Map<RowMajor> by_value(jacobians.data()[k], count, sizes[k]);
+    if (!by_value.allFinite()) return false;
     const GraphVariable& variable = factor.given.variables[k];
     if (variable.kind == GraphVariable::Kind::kPoint) {
-      *by_point = by_argument[k];
+      *by_point = by_value;
     } else if (variable.kind == GraphVariable::Kind::kPose) {
       const Pose& pose = poses_[variable.index];
       const Eigen::Index column = column_of(pose.variable);
       if (column < 0) continue;
-      const Eigen::Matrix<double, Eigen::Dynamic, 6> by_left = by_argument[k].leftCols<6>();
-      rows.jacobian.middleCols<6>(column) +=
-          pose.tangent.from_left(by_left, pose_at(pose.variable));
+      const Matrix6d by_increment = pose.tangent.from_origin(adjoint(pose_at(pose.variable)));
+      for (int row = 0; row < count; ++row) {
+        rows.jacobian.block<1, 6>(row, column) += by_value.block<1, 6>(row, 0) * by_increment;
+      }
     } else {
       const Block& block = blocks_[variable.index];
       const Eigen::Index column = column_of(block.variable);
       if (column < 0) continue;  // fixed
-      const Eigen::Map<const Eigen::VectorXd> value(given.blocks[k], sizes[k]);
-      const Eigen::MatrixXd by_value = by_argument[k];
-      rows.jacobian.middleCols(column, block.tangent_size()) +=
-          block.by_increment(by_value, carrier_rotation(block));
-      const Eigen::Index by_carrier =
-          block.given.world_vectors.empty() ? -1 : column_of(block.carrier);
-      if (by_carrier >= 0) {
-        rows.jacobian.middleCols<3>(by_carrier + 3) += block.by_turn(by_value, value);
+      if (!block.given.world_vectors.empty()) {
+        const Eigen::Index by_carrier = column_of(block.carrier);
+        const Eigen::Map<const Eigen::VectorXd> value(given.blocks()[k], sizes[k]);
+        if (by_carrier >= 0) {
+          block.add_by_turn(by_value, value, rows.jacobian.middleCols<3>(by_carrier + 3));
+        }
+        block.turn(by_value, carrier_rotation(block));
       }
+      block.add_by_increment(by_value, rows.jacobian.middleCols(column, block.tangent_size()));
     }
   }
   const RobustLoss loss{factor.given.loss, factor.given.threshold};
@@ -112,8 +147,7 @@ bool IncrementalSolver::linearize_factor(const Factor& factor, const Eigen::Vect
   rows.jacobian *= weight;
   if (by_point != nullptr) *by_point *= weight;
   for (std::size_t i = 0; i < variables.size(); ++i) {
-    rows.residual.noalias() -= rows.jacobian.middleCols(offsets[i], offsets[i + 1] - offsets[i]) *
-                               tree_.delta_of(variables[i]);
+    subtract(rows.jacobian, offsets[i], tree_.delta_of(variables[i]), rows.residual);
   }
   return true;
 }
@@ -134,7 +168,8 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_rows(std::uint32_t ind
   const Factor& factor = factors_[index];
   const RowsTerm& term = factor_terms_[index];
   if (!factor.there || factor.point != kNone) return {};
-  Eigen::VectorXd residual;
+  Scratch<double, kRows> scratch(static_cast<std::size_t>(factor.function->num_residuals()));
+  Eigen::Map<Eigen::VectorXd> residual(scratch.data(), factor.function->num_residuals());
   if (!factor_residual(factor, nullptr, residual)) {
     return term.rows.residual.size() == 0
                ? Evaluation{}
@@ -153,9 +188,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_rows(std::uint32_t ind
   result.squared_norm = residual.squaredNorm();
   residual -= term.rows.residual;
   for (std::size_t i = 0; i < term.variables.size(); ++i) {
-    residual.noalias() -=
-        term.rows.jacobian.middleCols(term.offsets[i], term.offsets[i + 1] - term.offsets[i]) *
-        tree_.delta_of(term.variables[i]);
+    subtract(term.rows.jacobian, term.offsets[i], tree_.delta_of(term.variables[i]), residual);
   }
   result.squared_mismatch = residual.squaredNorm();
   return result;
@@ -167,7 +200,8 @@ void IncrementalSolver::evaluate_factor_view(const FactorView& view, const Eigen
   if (!view.usable) return;
   const Factor& factor = factors_[view.factor];
   result.rows += factor.function->num_residuals();
-  Eigen::VectorXd residual;
+  Scratch<double, kRows> scratch(static_cast<std::size_t>(factor.function->num_residuals()));
+  Eigen::Map<Eigen::VectorXd> residual(scratch.data(), factor.function->num_residuals());
   if (!factor_residual(factor, &at, residual)) {
     result.squared_mismatch += kNoResult;
     result.cost += kNoResult;
@@ -179,11 +213,9 @@ void IncrementalSolver::evaluate_factor_view(const FactorView& view, const Eigen
   residual *= loss.root_weight(squared);
   result.squared_norm += residual.squaredNorm();
   residual -= view.rows.residual;
-  residual.noalias() -= view.by_point * displacement;
+  for (Eigen::Index i = 0; i < 3; ++i) residual -= displacement[i] * view.by_point.col(i);
   for (std::size_t i = 0; i < view.variables.size(); ++i) {
-    residual.noalias() -=
-        view.rows.jacobian.middleCols(view.offsets[i], view.offsets[i + 1] - view.offsets[i]) *
-        tree_.delta_of(view.variables[i]);
+    subtract(view.rows.jacobian, view.offsets[i], tree_.delta_of(view.variables[i]), residual);
   }
   result.squared_mismatch += residual.squaredNorm();
 }

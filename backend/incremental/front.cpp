@@ -16,4 +16,50 @@ void Front::add_dense(std::span<const std::uint32_t> variables,
   }
 }
 
+void Front::add_rows(std::span<const std::uint32_t> variables,
+                     std::span<const Eigen::Index> offsets, const Eigen::MatrixXd& jacobian,
+                     const Eigen::VectorXd& residual) {
+  for (std::size_t j = 0; j < variables.size(); ++j) {
+    const std::uint32_t slot_j = slot(variables[j]);
+    for (Eigen::Index b = 0; b < offsets[j + 1] - offsets[j]; ++b) {
+      const auto by_b = jacobian.col(offsets[j] + b);
+      const Eigen::Index at_b = offsets_[slot_j] + b;
+      matrix_(matrix_.rows() - 1, at_b) += by_b.dot(residual);
+      scale_[at_b] += by_b.squaredNorm();
+      for (std::size_t i = 0; i < variables.size(); ++i) {
+        const std::uint32_t slot_i = slot(variables[i]);
+        if (slot_i < slot_j) continue;
+        for (Eigen::Index a = 0; a < offsets[i + 1] - offsets[i]; ++a) {
+          matrix_(offsets_[slot_i] + a, at_b) += jacobian.col(offsets[i] + a).dot(by_b);
+        }
+      }
+    }
+  }
+}
+
+void Front::subtract_reduced(std::span<const std::uint32_t> variables,
+                             std::span<const Eigen::Index> offsets,
+                             const Eigen::Map<const Eigen::MatrixX3d>& reduced,
+                             const Eigen::Vector3d& half_solved) {
+  for (std::size_t j = 0; j < variables.size(); ++j) {
+    const std::uint32_t slot_j = slot(variables[j]);
+    const Eigen::Index columns = offsets[j + 1] - offsets[j];
+    for (std::size_t i = 0; i < variables.size(); ++i) {
+      const std::uint32_t slot_i = slot(variables[i]);
+      if (slot_i < slot_j) continue;
+      const Eigen::Index rows = offsets[i + 1] - offsets[i];
+      if (rows == 6 && columns == 6) {
+        matrix_.block<6, 6>(offsets_[slot_i], offsets_[slot_j]).noalias() -=
+            reduced.middleRows<6>(offsets[i]) * reduced.middleRows<6>(offsets[j]).transpose();
+      } else {
+        matrix_.block(offsets_[slot_i], offsets_[slot_j], rows, columns) -=
+            reduced.middleRows(offsets[i], rows)
+                .lazyProduct(reduced.middleRows(offsets[j], columns).transpose());
+      }
+    }
+    matrix_.row(matrix_.rows() - 1).segment(offsets_[slot_j], columns) -=
+        reduced.middleRows(offsets[j], columns).lazyProduct(half_solved).transpose();
+  }
+}
+
 }  // namespace hybrid_slam

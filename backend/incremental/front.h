@@ -60,6 +60,17 @@ class Front {
     scale_.template segment<kRows>(offsets_[slot], diagonal.rows()) += diagonal;
   }
 
+  // Rows over these variables, each from its offset on, and their residuals: J^T J, J^T r and the
+  // scale. For few rows: each pair of variables by itself.
+  void add_rows(std::span<const std::uint32_t> variables, std::span<const Eigen::Index> offsets,
+                const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual);
+  // What the elimination of an unknown of three numbers takes from these variables: with
+  // U = reduced, by rows, -U U^T and -U half_solved.
+  void subtract_reduced(std::span<const std::uint32_t> variables,
+                        std::span<const Eigen::Index> offsets,
+                        const Eigen::Map<const Eigen::MatrixX3d>& reduced,
+                        const Eigen::Vector3d& half_solved);
+
   // All of a term that is dense: information and gradient over these variables, each from its
   // offset on (one more than variables).
   void add_dense(std::span<const std::uint32_t> variables, std::span<const Eigen::Index> offsets,

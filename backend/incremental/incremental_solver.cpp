@@ -118,7 +118,9 @@ Eigen::VectorXd IncrementalSolver::block(std::uint32_t index) const {
   const Block& block = blocks_.at(index);
   if (!block.there) throw std::logic_error("IncrementalSolver::block: was removed");
   if (variables_[block.variable].fixed) return block.given.values;
-  return block.in_world(block.inner_at(tree_.delta_of(block.variable)), carrier_rotation(block));
+  Eigen::VectorXd values(block.inner.size());
+  block.write(tree_.delta_of(block.variable), carrier_rotation(block), values.data());
+  return values;
 }
 
 Eigen::Vector3d IncrementalSolver::point(std::uint32_t index) const {

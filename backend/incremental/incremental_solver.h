@@ -235,10 +235,11 @@ class IncrementalSolver final : private TermSource {
   Vector6d edge_residual(std::uint32_t index) const;
   // The same of factors of any kind. `point`: that of a landmark's, else null. False if the
   // function fails or gives what is not a number.
-  struct Arguments;
-  Arguments arguments(const Factor& factor, const Eigen::Vector3d* point) const;
+  class Arguments;
+  double* write_value(const GraphVariable& variable, const Eigen::Vector3d* point,
+                      double* to) const;
   bool factor_residual(const Factor& factor, const Eigen::Vector3d* point,
-                       Eigen::VectorXd& residual) const;
+                       Eigen::Ref<Eigen::VectorXd> residual) const;
   bool linearize_factor(const Factor& factor, const Eigen::Vector3d* point,
                         const std::vector<std::uint32_t>& variables,
                         const std::vector<Eigen::Index>& offsets, LinearSystem& rows,

@@ -1,10 +1,12 @@
 #include "backend/incremental/landmark_term.h"
 
 #include <algorithm>
+#include <span>
 
 #include <Eigen/Cholesky>
 
 #include "backend/incremental/front.h"
+#include "backend/incremental/scratch.h"
 
 namespace hybrid_slam {
 
@@ -20,8 +22,8 @@ void LandmarkTerm::eliminate() {
   }
   for (const FactorView& view : factors) {
     if (!view.usable) continue;
-    information.noalias() += view.by_point.transpose() * view.by_point;
-    gradient.noalias() += view.by_point.transpose() * view.rows.residual;
+    information += view.by_point.transpose().lazyProduct(view.by_point);
+    gradient += view.by_point.transpose().lazyProduct(view.rows.residual);
   }
   const Eigen::LLT<Eigen::Matrix3d> llt(information);
   factor = llt.matrixL();
@@ -36,9 +38,11 @@ void LandmarkTerm::eliminate() {
   }
   for (FactorView& view : factors) {
     if (!view.usable) continue;
-    const Eigen::Matrix<double, 3, Eigen::Dynamic> cross =
-        view.by_point.transpose() * view.rows.jacobian;
-    view.reduced = factor.triangularView<Eigen::Lower>().solve(cross).transpose();
+    view.reduced.resize(view.rows.jacobian.cols(), 3);
+    for (Eigen::Index i = 0; i < view.reduced.rows(); ++i) {
+      const Eigen::Vector3d cross = view.by_point.transpose().lazyProduct(view.rows.jacobian.col(i));
+      view.reduced.row(i) = factor.triangularView<Eigen::Lower>().solve(cross).transpose();
+    }
   }
 }
 
@@ -73,51 +77,44 @@ void LandmarkTerm::assemble(Front& front) const {
   }
 }
 
-// The same with factors of any kind: what several views say about a variable is summed up first.
+// The same with factors of any kind. What several views say about a variable is summed up first, so
+// that each pair of variables is met once.
 void LandmarkTerm::assemble_mixed(Front& front) const {
-  std::vector<Eigen::Index> offsets{0};  // of `poses`
-  for (const std::uint32_t variable : poses) {
-    const std::uint32_t slot = front.slot(variable);
-    offsets.push_back(offsets.back() + front.row(slot + 1) - front.row(slot));
+  const std::size_t count = poses.size();
+  Scratch<Eigen::Index, 32> first(count + 1);  // of `poses`
+  const std::span<Eigen::Index> offsets(first.data(), count + 1);
+  offsets[0] = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t slot = front.slot(poses[i]);
+    offsets[i + 1] = offsets[i] + front.row(slot + 1) - front.row(slot);
   }
   const auto row_of = [&](std::uint32_t variable) {
     return offsets[static_cast<std::size_t>(std::find(poses.begin(), poses.end(), variable) -
                                             poses.begin())];
   };
-  const Eigen::Index size = offsets.back();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(size, size);
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
-  Eigen::MatrixX3d reduced = Eigen::MatrixX3d::Zero(size, 3);
+  const Eigen::Index size = offsets[count];
+  Scratch<double, 3 * 6 * 16> numbers(static_cast<std::size_t>(3 * size));
+  Eigen::Map<Eigen::MatrixX3d> sum(numbers.data(), size, 3);
+  sum.setZero();
   for (const LandmarkView& view : views) {
     if (!view.usable || view.fixed) continue;
-    const Eigen::Index row = row_of(view.pose);
-    information.block<6, 6>(row, row) += view.by_pose.transpose() * view.by_pose;
-    gradient.segment<6>(row) += view.by_pose.transpose() * view.residual;
-    reduced.middleRows<6>(row) += view.reduced;
+    const std::uint32_t slot = front.slot(view.pose);
+    const Matrix6d own = view.by_pose.transpose() * view.by_pose;
+    front.add(slot, slot, own);
+    front.add_scale(slot, own.diagonal());
+    front.add_gradient(slot, view.by_pose.transpose() * view.residual);
+    sum.middleRows<6>(row_of(view.pose)) += view.reduced;
   }
   for (const FactorView& view : factors) {
     if (!view.usable) continue;
-    const Eigen::MatrixXd own = view.rows.jacobian.transpose() * view.rows.jacobian;
-    const Eigen::VectorXd slope = view.rows.jacobian.transpose() * view.rows.residual;
+    front.add_rows(view.variables, view.offsets, view.rows.jacobian, view.rows.residual);
     for (std::size_t i = 0; i < view.variables.size(); ++i) {
-      const Eigen::Index row = row_of(view.variables[i]);
       const Eigen::Index rows = view.offsets[i + 1] - view.offsets[i];
-      gradient.segment(row, rows) += slope.segment(view.offsets[i], rows);
-      reduced.middleRows(row, rows) += view.reduced.middleRows(view.offsets[i], rows);
-      for (std::size_t j = 0; j < view.variables.size(); ++j) {
-        const Eigen::Index columns = view.offsets[j + 1] - view.offsets[j];
-        information.block(row, row_of(view.variables[j]), rows, columns) +=
-            own.block(view.offsets[i], view.offsets[j], rows, columns);
-      }
+      sum.middleRows(row_of(view.variables[i]), rows) +=
+          view.reduced.middleRows(view.offsets[i], rows);
     }
   }
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Eigen::Index rows = offsets[i + 1] - offsets[i];
-    front.add_scale(front.slot(poses[i]), information.diagonal().segment(offsets[i], rows));
-  }
-  information.noalias() -= reduced * reduced.transpose();
-  gradient.noalias() -= reduced * half_solved;
-  front.add_dense(poses, offsets, information, gradient);
+  front.subtract_reduced(poses, offsets, {numbers.data(), size, 3}, half_solved);
 }
 
 }  // namespace hybrid_slam

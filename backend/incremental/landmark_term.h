@@ -81,8 +81,9 @@ struct LandmarkTerm {
       if (!view.usable) continue;
       for (std::size_t i = 0; i < view.variables.size(); ++i) {
         const Eigen::Index rows = view.offsets[i + 1] - view.offsets[i];
-        right.noalias() += view.reduced.middleRows(view.offsets[i], rows).transpose() *
-                           delta_of_any(view.variables[i]);
+        right += view.reduced.middleRows(view.offsets[i], rows)
+                     .transpose()
+                     .lazyProduct(delta_of_any(view.variables[i]));
       }
     }
     for (const LandmarkView& view : views) {

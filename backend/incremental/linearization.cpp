@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "backend/incremental/incremental_solver.h"
+#include "backend/incremental/scratch.h"
 #include "factors/camera_reprojection.h"
 
 // What an IncrementalSolver asks its terms: their linearisation at the present estimate, and how
@@ -123,24 +124,26 @@ double IncrementalSolver::linearize(LandmarkTerm& landmark, const Eigen::Vector3
   const Eigen::Vector3d start = carried_base(landmark);
   Eigen::Vector3d step = wanted - start;
   if (!step.allFinite()) step.setZero();
-  std::vector<char> had;  // the views and factors that could be used before
-  for (const LandmarkView& view : landmark.views) had.push_back(view.usable ? 1 : 0);
-  for (const FactorView& view : landmark.factors) had.push_back(view.usable ? 1 : 0);
+  const std::size_t count = landmark.views.size();
+  Scratch<char, 64> had(count + landmark.factors.size());
+  for (std::size_t i = 0; i < count; ++i) had.data()[i] = landmark.views[i].usable ? 1 : 0;
+  for (std::size_t i = 0; i < landmark.factors.size(); ++i) {
+    had.data()[count + i] = landmark.factors[i].usable ? 1 : 0;
+  }
   double cost = 0;
   const auto linearize_at = [&](const Eigen::Vector3d& at) {
     bool all = true;
     cost = 0;
-    auto before = had.begin();
-    for (LandmarkView& view : landmark.views) {
+    for (std::size_t i = 0; i < count; ++i) {
+      LandmarkView& view = landmark.views[i];
       view.usable = linearize_view(at, view, cost);
-      all = (view.usable || *before == 0) && all;
-      ++before;
+      all = all && (view.usable || had.data()[i] == 0);
     }
-    for (FactorView& view : landmark.factors) {
+    for (std::size_t i = 0; i < landmark.factors.size(); ++i) {
+      FactorView& view = landmark.factors[i];
       view.usable = linearize_factor(factors_[view.factor], &at, view.variables, view.offsets,
                                      view.rows, &view.by_point, cost);
-      all = (view.usable || *before == 0) && all;
-      ++before;
+      all = all && (view.usable || had.data()[count + i] == 0);
     }
     return all;
   };

@@ -5,7 +5,13 @@
 namespace hybrid_slam {
 
 void RowsTerm::assemble(Front& front) const {
+  // Up to so many rows products of any size take longer to set up than to do.
+  constexpr Eigen::Index kFewRows = 16;
   if (rows.residual.size() == 0) return;
+  if (rows.residual.size() <= kFewRows) {
+    front.add_rows(variables, offsets, rows.jacobian, rows.residual);
+    return;
+  }
   const Eigen::MatrixXd information = rows.jacobian.transpose() * rows.jacobian;
   const Eigen::VectorXd gradient = rows.jacobian.transpose() * rows.residual;
   front.add_dense(variables, offsets, information, gradient);
