@@ -31,7 +31,8 @@ std::size_t sum_of(const std::vector<int>& sizes) {
 
 // residual -= columns * delta: few rows, which a general product would spend most of its time on.
 void subtract(const Eigen::MatrixXd& jacobian, Eigen::Index first,
-              const Eigen::Map<const Eigen::VectorXd>& delta, Eigen::Ref<Eigen::VectorXd> residual) {
+              const Eigen::Map<const Eigen::VectorXd>& delta,
+              Eigen::Ref<Eigen::VectorXd> residual) {
   for (Eigen::Index i = 0; i < delta.size(); ++i) residual -= delta[i] * jacobian.col(first + i);
 }
 

@@ -1,5 +1,7 @@
 #include "backend/incremental/front.h"
 
+#include "backend/incremental/scratch.h"
+
 namespace hybrid_slam {
 
 void Front::add_dense(std::span<const std::uint32_t> variables,
@@ -19,6 +21,9 @@ void Front::add_dense(std::span<const std::uint32_t> variables,
 void Front::add_rows(std::span<const std::uint32_t> variables,
                      std::span<const Eigen::Index> offsets, const Eigen::MatrixXd& jacobian,
                      const Eigen::VectorXd& residual) {
+  Scratch<double, 512> numbers(static_cast<std::size_t>(jacobian.size()));
+  Eigen::Map<Eigen::MatrixXd> by_row(numbers.data(), jacobian.cols(), jacobian.rows());
+  by_row = jacobian.transpose();
   for (std::size_t j = 0; j < variables.size(); ++j) {
     const std::uint32_t slot_j = slot(variables[j]);
     for (Eigen::Index b = 0; b < offsets[j + 1] - offsets[j]; ++b) {
@@ -29,8 +34,15 @@ void Front::add_rows(std::span<const std::uint32_t> variables,
       for (std::size_t i = 0; i < variables.size(); ++i) {
         const std::uint32_t slot_i = slot(variables[i]);
         if (slot_i < slot_j) continue;
-        for (Eigen::Index a = 0; a < offsets[i + 1] - offsets[i]; ++a) {
-          matrix_(offsets_[slot_i] + a, at_b) += jacobian.col(offsets[i] + a).dot(by_b);
+        const Eigen::Index size = offsets[i + 1] - offsets[i];
+        auto column = matrix_.col(at_b).segment(offsets_[slot_i], size);
+        for (Eigen::Index row = 0; row < by_b.size(); ++row) {
+          const auto by_a = by_row.col(row).segment(offsets[i], size);
+          if (size == 6) {
+            column.head<6>() += by_b[row] * by_a.head<6>();
+          } else {
+            column += by_b[row] * by_a;
+          }
         }
       }
     }

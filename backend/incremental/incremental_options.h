@@ -18,9 +18,9 @@ struct IncrementalOptions {
   double worst_mismatch = 0.5;
   // Back-substitution stops where a pose moves by less (metres, radians).
   double wildfire = 1e-5;
-  // The same of other variables, in their standard deviations: a calibration that all terms share
-  // moves a little with every update, and so seldom reaches them all. What is left out of the cost
-  // is half the square of this.
+  // The same of other variables, in their standard deviations; three times as much of one that all
+  // terms share, such as a calibration, which moves a little with every update and so seldom
+  // reaches them all. What is left out of the cost is half the square of this.
   double block_wildfire = 0.1;
   int max_steps = 3;  // Gauss-Newton steps per update
   // Multiplications that relinearising old terms may cost per update, on average; what was not

@@ -253,8 +253,15 @@ class IncrementalSolver final : private TermSource {
   void evaluate_factor_view(const FactorView& view, const Eigen::Vector3d& at,
                             const Eigen::Vector3d& displacement, Evaluation& result) const;
   void evaluate(std::uint32_t term);
+  // backend/incremental/landmark_change.cpp
+  void note_reach(LandmarkTerm& landmark) const;
+  void note_evaluated(LandmarkTerm& landmark) const;
+  bool has_changed(const LandmarkTerm& landmark) const;
+  bool has_changed(const Term& term) const;
   void check(const std::vector<std::uint32_t>& linearized, const std::vector<std::uint32_t>& moved);
-  std::size_t choose();
+  std::size_t choose(bool again);
+  bool choose_near(double limit, std::vector<std::uint32_t>& chosen);
+  void take_pending(std::uint32_t id);
   std::size_t settle_moves();
   double typical() const;
 

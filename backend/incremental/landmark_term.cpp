@@ -40,7 +40,8 @@ void LandmarkTerm::eliminate() {
     if (!view.usable) continue;
     view.reduced.resize(view.rows.jacobian.cols(), 3);
     for (Eigen::Index i = 0; i < view.reduced.rows(); ++i) {
-      const Eigen::Vector3d cross = view.by_point.transpose().lazyProduct(view.rows.jacobian.col(i));
+      const Eigen::Vector3d cross =
+          view.by_point.transpose().lazyProduct(view.rows.jacobian.col(i));
       view.reduced.row(i) = factor.triangularView<Eigen::Lower>().solve(cross).transpose();
     }
   }

@@ -60,6 +60,11 @@ struct LandmarkTerm {
   bool solvable = false;                                  // the views determine the point
   // What a judged step leaves out of the displacement, since with it the cost would be higher.
   Eigen::Vector3d held_back = Eigen::Vector3d::Zero();
+  // Of a landmark with factors (IncrementalSolver::has_changed): by how much the residuals change
+  // with each component of `poses`, and with each of a motion in common; the deltas of `poses` when
+  // it was evaluated last.
+  std::vector<float> reach;
+  std::vector<float> evaluated_at;
 
   // How many views and factors can be used.
   std::size_t usable_count() const;

@@ -168,6 +168,7 @@ double IncrementalSolver::linearize(LandmarkTerm& landmark, const Eigen::Vector3
     landmark.anchor_delta = tree_.delta(landmark.anchor);
   }
   landmark.eliminate();
+  if (!landmark.factors.empty()) note_reach(landmark);
   return landmark.solvable ? cost : 0;
 }
 
@@ -239,7 +240,11 @@ void IncrementalSolver::evaluate(std::uint32_t id) {
   Term& term = terms_[id];
   Evaluation at;
   if (term.kind == TermKind::kEdge) at = evaluate_edge(term.index);
-  if (term.kind == TermKind::kLandmark) at = evaluate_landmark(term.index);
+  if (term.kind == TermKind::kLandmark) {
+    at = evaluate_landmark(term.index);
+    LandmarkTerm& landmark = *landmarks_[term.index];
+    if (!landmark.factors.empty() && !term.dirty) note_evaluated(landmark);
+  }
   if (term.kind == TermKind::kPrior) at = evaluate_prior(term.index);
   if (term.kind == TermKind::kFactor) at = evaluate_rows(term.index);
   if (term.kind == TermKind::kCondensed) at = evaluate_condensed(term.index);

@@ -58,6 +58,28 @@ double PoseTree::cost_of(std::span<const std::uint32_t> poses, std::vector<char>
   return cost;
 }
 
+bool PoseTree::mark_up_to(double& most, std::span<const std::uint32_t> poses,
+                          std::vector<char>& marked) const {
+  marked.resize(std::max(marked.size(), cliques_.size()), 0);
+  std::vector<std::int32_t> way;
+  double cost = 0;
+  for (std::size_t k = 0; k < poses.size() && cost <= most; ++k) {
+    for (std::int32_t i = clique_of_[poses[k]]; i != kNone && cost <= most; i = at(i).parent) {
+      char& mark = marked[static_cast<std::size_t>(i)];
+      if (mark != 0) break;
+      mark = 1;
+      way.push_back(i);
+      cost += factor_cost(at(i).frontal_rows(), at(i).separator_rows());
+    }
+  }
+  if (cost <= most) {
+    most -= cost;
+    return true;
+  }
+  for (const std::int32_t i : way) marked[static_cast<std::size_t>(i)] = 0;
+  return false;
+}
+
 bool PoseTree::is_marked(std::span<const std::uint32_t> poses,
                          const std::vector<char>& marked) const {
   return std::all_of(poses.begin(), poses.end(), [&](std::uint32_t pose) {

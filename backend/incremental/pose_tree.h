@@ -34,6 +34,7 @@ class PoseTree {
     // A variable that is no pose has changed once it moved by this share of its standard deviation
     // (given what is eliminated after it): no threshold in its units is needed.
     double share = 0.1;
+    double shared_share = 0.3;  // the same of one that is shared
   };
 
   explicit PoseTree(const Options& options) : options_(options) {}
@@ -47,6 +48,11 @@ class PoseTree {
   // Cost of factoring anew what terms on these poses would touch, in multiplications; what is in
   // `marked` (a set of clique indices, kept by the caller between calls) is already paid for.
   double cost_of(std::span<const std::uint32_t> poses, std::vector<char>& marked) const;
+
+  // The same where that costs no more than `most`, which is then less by it; else nothing is
+  // marked.
+  bool mark_up_to(double& most, std::span<const std::uint32_t> poses,
+                  std::vector<char>& marked) const;
 
   // Whether factoring anew what is marked includes all terms on these poses.
   bool is_marked(std::span<const std::uint32_t> poses, const std::vector<char>& marked) const;

@@ -17,7 +17,7 @@ bool PoseTree::has_changed(const Eigen::MatrixXd& factor, std::uint32_t variable
   const Eigen::VectorXd way = delta_of(variable) - sent;
   const auto root = factor.block(row, row, way.size(), way.size());
   const Eigen::VectorXd in_sigmas = root.triangularView<Eigen::Lower>().transpose() * way;
-  return in_sigmas.norm() > options_.share;
+  return in_sigmas.norm() > (is_shared(variable) ? options_.shared_share : options_.share);
 }
 
 // What the frontals' triangle is solved for, with the deltas of the separator as they are.
