@@ -25,7 +25,8 @@ class MotionLadder {
   MotionLadder(const Calibrated<RectifiedStereo>& camera, const StereoOdometerOptions& options)
       : camera_(camera), odometer_(camera, options) {}
 
-  std::optional<LadderStep> climb(const Frame& from, const Frame& to) const;
+  // `disparity_doubt`: of both frames, see StereoOdometer.
+  std::optional<LadderStep> climb(const Frame& from, const Frame& to, double disparity_doubt) const;
 
  private:
   Calibrated<RectifiedStereo> camera_;
