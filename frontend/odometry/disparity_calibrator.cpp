@@ -210,7 +210,7 @@ void DisparityCalibrator::add(const StereoFeatures& previous, double previous_co
   double squared_sigma = 0;
   for (const CircularMatch& match : motion.inliers) {
     const auto contribution =
-        TwoFramePoint(camera_, motion.by_current_frame,
+        TwoFramePoint(camera_, motion.current_from_previous,
                       measurement(previous, match.previous, previous_correction),
                       previous.left.keypoints[static_cast<std::size_t>(match.previous)].sigma,
                       measurement(current, match.current, current_correction),

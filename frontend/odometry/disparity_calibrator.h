@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cmath>
 #include <optional>
 #include <string>
 
@@ -46,9 +45,6 @@ class DisparityCalibrator {
   // [px]; 0 as long as it is not significant. Changes at stated numbers of pairs alone.
   double offset() const { return estimate_.in_use(); }
   double sigma() const { return estimate_.sigma(); }  // standard deviation of the estimate [px]
-
-  // How far what is in use may be off, one standard deviation [px].
-  double doubt() const { return std::hypot(sigma(), estimate_.value_now() - offset()); }
 
   const RunningEstimate& estimate() const { return estimate_; }
 

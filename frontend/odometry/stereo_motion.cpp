@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "frontend/odometry/stereo_motion_fit.h"
+#include "frontend/odometry/stereo_motion_covariance.h"
 #include "frontend/pose/damped_gauss_newton.h"
 #include "frontend/pose/random_sampler.h"
 #include "frontend/pose/rigid_alignment.h"
@@ -41,16 +41,13 @@ class StereoMotionSolver {
     std::vector<StereoSight> sights;
     for (const int i : inliers) {
       const Point& p = points_[static_cast<std::size_t>(i)];
-      sights.push_back({p.previous,
-                        {p.measured[0], 0.5 * (p.measured[1] + p.measured[3]), p.measured[2]},
-                        p.previous_variance,
-                        p.current_variance});
+      sights.push_back(
+          {p.in_previous, p.measured, p.squared_weight, p.previous_variance, p.current_variance});
     }
-    const std::optional<FittedStereoMotion> fitted =
-        fit_stereo_motion(params_, *motion, sights, options_.inlier_threshold);
-    if (!fitted) return std::nullopt;
-    StereoMotionSolution solution{fitted->motion, fitted->covariance, fitted->by_offset, *motion,
-                                  std::move(inliers)};
+    const std::optional<Matrix6d> covariance =
+        stereo_motion_covariance(params_, *motion, sights, options_.inlier_threshold);
+    if (!covariance) return std::nullopt;
+    StereoMotionSolution solution{*motion, *covariance, std::move(inliers)};
     for (int& i : solution.inliers) i = points_[static_cast<std::size_t>(i)].index;
     return solution;
   }
@@ -58,7 +55,6 @@ class StereoMotionSolver {
  private:
   struct Point {
     int index;                    // among the caller's correspondences
-    Eigen::Vector3d previous;     // measured (u_left, v, u_right)
     Eigen::Vector3d in_previous;  // triangulated
     Eigen::Vector3d in_current;   // the same; not finite where the disparity allows none
     Eigen::Vector4d measured;     // (u_left, v_left, u_right, v_right) in the current frame
@@ -76,7 +72,7 @@ class StereoMotionSolver {
     if (!in_previous || !in_current) return;
     const double cu = std::max(std::abs(params_[2]), 1.0);
     const double weight = 1 / (std::abs(c.current[0] - params_[2]) / cu + 0.05);
-    points_.push_back({index, c.previous, *in_previous, *in_current, c.current, weight * weight,
+    points_.push_back({index, *in_previous, *in_current, c.current, weight * weight,
                        c.previous_sigma * c.previous_sigma, c.current_sigma * c.current_sigma});
   }
 
@@ -216,7 +212,6 @@ std::string StereoOdometerOptions::validate() const {
   if (ransac_iterations < 1) return "ransac_iterations must be at least 1";
   if (!(inlier_threshold > 0)) return "inlier_threshold must be positive";
   if (min_inliers < 3) return "min_inliers must be at least 3";
-  if (!(common_error >= 0)) return "common_error must not be negative";
   if (max_gauss_newton_iterations < 1) return "max_gauss_newton_iterations must be at least 1";
   return "";
 }

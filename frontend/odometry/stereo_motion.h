@@ -18,10 +18,6 @@ struct StereoOdometerOptions {
   double inlier_threshold = 2.0;  // [px] over the four coordinates
   int min_inliers = 6;
   int max_gauss_newton_iterations = 20;  // of a hypothesis
-  // What all matches are off by in common, one standard deviation, over how far they moved: lenses
-  // and lamps that move along leave 0.2 to 0.4 % of a motion (docs/backend.md). Part of the
-  // covariance that the odometer gives.
-  double common_error = 0.003;
   std::uint64_t seed = 0;
 
   // Empty if the values can be used, else what is wrong.
@@ -40,19 +36,16 @@ struct StereoCorrespondence {
 
 struct StereoMotionSolution {
   Rigid3d current_from_previous;
-  // Of its left perturbation (translation, rotation). First order; what all matches are off by in
-  // common is not in it.
+  // Of its left perturbation (translation, rotation): stereo_motion_covariance(). First order; what
+  // all matches are off by in common is not in it.
   Matrix6d covariance;
-  Vector6d by_offset;        // of the motion, by an offset of all disparities: FittedStereoMotion
-  Rigid3d by_current_frame;  // where its fit began: see below
   std::vector<int> inliers;  // indices of correspondences, ascending
 };
 
-// Ego-motion of a stereo pair. First as VISO2 finds it: points triangulated from the previous
-// frame, hypotheses from three of them, least squares in the four coordinates in the current frame
-// with the weights 1 / (|u - cu| / cu + 0.05) of the left image. Those within the threshold then
-// are fitted by the noise of both frames, fit_stereo_motion(). Correspondences that are not finite
-// or have no positive disparity in the previous frame are never inliers. None if fewer than
+// Ego-motion of a stereo pair as VISO2 finds it: points triangulated from the previous frame,
+// hypotheses from three of them, least squares in the four coordinates in the current frame with
+// the weights 1 / (|u - cu| / cu + 0.05) of the left image. Correspondences that are not finite or
+// have no positive disparity in the previous frame are never inliers. None if fewer than
 // min_inliers agree or they leave the motion open. Same seed, same result.
 std::optional<StereoMotionSolution> solve_stereo_motion(
     const Calibrated<RectifiedStereo>& camera,

@@ -33,8 +33,7 @@ StereoOdometer::StereoOdometer(const Calibrated<RectifiedStereo>& camera,
 }
 
 std::optional<StereoMotion> StereoOdometer::estimate(const StereoFeatures& previous,
-                                                     const StereoFeatures& current,
-                                                     double disparity_doubt) const {
+                                                     const StereoFeatures& current) const {
   const std::vector<CircularMatch> matches = match_circular(previous, current, {});
   std::vector<StereoCorrespondence> correspondences;
   correspondences.reserve(matches.size());
@@ -46,7 +45,6 @@ std::optional<StereoMotion> StereoOdometer::estimate(const StereoFeatures& previ
   StereoMotion motion;
   motion.current_from_previous = solution->current_from_previous;
   motion.covariance = solution->covariance;
-  motion.by_current_frame = solution->by_current_frame;
   motion.matches = static_cast<int>(matches.size());
   auto inlier = solution->inliers.begin();
   for (std::size_t i = 0; i < matches.size(); ++i) {
@@ -55,20 +53,7 @@ std::optional<StereoMotion> StereoOdometer::estimate(const StereoFeatures& previ
     (agrees ? motion.inliers : motion.outliers).push_back(matches[i]);
   }
   motion.support = support(motion, previous);
-  const Vector6d by_offset = disparity_doubt * solution->by_offset;
-  motion.covariance += by_offset * by_offset.transpose();
-  motion.covariance += common_error(motion.current_from_previous, motion.support.depth);
-  motion.support.covariance = motion.covariance;
   return motion;
-}
-
-// A share of the way that points at this depth move, and of the angle under which it is seen.
-Matrix6d StereoOdometer::common_error(const Rigid3d& motion, double depth) const {
-  const double angle = Eigen::AngleAxisd(motion.rotation()).angle();
-  const double off = options_.common_error * (motion.translation().norm() + depth * angle);
-  Vector6d sigma;
-  sigma << Eigen::Vector3d::Constant(off), Eigen::Vector3d::Constant(off / depth);
-  return sigma.cwiseAbs2().asDiagonal();
 }
 
 PoseSupport StereoOdometer::support(const StereoMotion& motion,

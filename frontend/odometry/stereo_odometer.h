@@ -15,7 +15,6 @@ namespace hybrid_slam {
 struct StereoMotion {
   Rigid3d current_from_previous;
   Matrix6d covariance = Matrix6d::Zero();  // of its left perturbation: see StereoMotionSolution
-  Rigid3d by_current_frame;                // see StereoMotionSolution
   std::vector<CircularMatch> inliers;
   std::vector<CircularMatch> outliers;  // the other matches; of circular ones only
   int matches = 0;                      // before RANSAC
@@ -30,14 +29,11 @@ class StereoOdometer {
  public:
   StereoOdometer(const Calibrated<RectifiedStereo>& camera, const StereoOdometerOptions& options);
 
-  // None if fewer than min_inliers agree. `disparity_doubt`: by how much all disparities may be off
-  // alike, one standard deviation [px]; part of the covariance.
+  // None if fewer than min_inliers agree.
   std::optional<StereoMotion> estimate(const StereoFeatures& previous,
-                                       const StereoFeatures& current,
-                                       double disparity_doubt = 0) const;
+                                       const StereoFeatures& current) const;
 
  private:
-  Matrix6d common_error(const Rigid3d& motion, double depth) const;
   PoseSupport support(const StereoMotion& motion, const StereoFeatures& previous) const;
 
   Calibrated<RectifiedStereo> camera_;

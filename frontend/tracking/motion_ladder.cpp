@@ -6,8 +6,7 @@
 
 namespace hybrid_slam {
 
-std::optional<LadderStep> MotionLadder::climb(const Frame& from, const Frame& to,
-                                              double disparity_doubt) const {
+std::optional<LadderStep> MotionLadder::climb(const Frame& from, const Frame& to) const {
   std::optional<LadderStep> best;
   // True if the ladder ends here.
   const auto take = [&](std::optional<StereoMotion> motion, Prediction rung) {
@@ -18,7 +17,7 @@ std::optional<LadderStep> MotionLadder::climb(const Frame& from, const Frame& to
     }
     return believed;
   };
-  if (take(odometer_.estimate(from.features, to.features, disparity_doubt), Prediction::kOdometer) ||
+  if (take(odometer_.estimate(from.features, to.features), Prediction::kOdometer) ||
       take(motion_by_left_matches(camera_, from.features, to.features), Prediction::kLeftMatches) ||
       !from.image || !to.image) {
     return best;

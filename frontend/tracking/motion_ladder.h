@@ -25,8 +25,7 @@ class MotionLadder {
   MotionLadder(const Calibrated<RectifiedStereo>& camera, const StereoOdometerOptions& options)
       : camera_(camera), odometer_(camera, options) {}
 
-  // `disparity_doubt`: of both frames, see StereoOdometer.
-  std::optional<LadderStep> climb(const Frame& from, const Frame& to, double disparity_doubt) const;
+  std::optional<LadderStep> climb(const Frame& from, const Frame& to) const;
 
  private:
   Calibrated<RectifiedStereo> camera_;

@@ -229,7 +229,7 @@ void StereoTracker::coast(const Frame& frame, const MapSnapshot& map, TrackedFra
 // From the last tracked frame, by a frame between whose place was not known well enough.
 std::optional<LadderStep> StereoTracker::across_gap(const Frame& frame) const {
   if (!unplaced_) return std::nullopt;
-  auto step = ladder_.climb(unplaced_->frame, frame, disparity_.doubt());
+  auto step = ladder_.climb(unplaced_->frame, frame);
   if (!step || !step->believed) return std::nullopt;
   const UncertainMotion whole =
       UncertainMotion{step->motion.current_from_previous, step->motion.covariance} *
@@ -252,7 +252,7 @@ void StereoTracker::correct_disparities(Frame& frame) const {
 // pose, where there is none.
 std::optional<LadderStep> StereoTracker::predict(Frame& frame, TrackedFrame& result) {
   const Frame& last = last_.frame();
-  auto step = ladder_.climb(last, frame, disparity_.doubt());
+  auto step = ladder_.climb(last, frame);
   if (step && step->rung == Prediction::kOdometer) {
     disparity_.add(last.features, last.u_right_correction, frame.features, frame.u_right_correction,
                    step->motion);

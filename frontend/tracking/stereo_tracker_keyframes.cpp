@@ -38,7 +38,7 @@ bool StereoTracker::can_carry_map(const Frame& frame) const {
 // to the next is as likely, and chance matches in the dark do not.
 bool StereoTracker::continues_untracked(const Frame& frame) const {
   if (!untracked_) return false;
-  const auto step = ladder_.climb(*untracked_, frame, disparity_.doubt());
+  const auto step = ladder_.climb(*untracked_, frame);
   return step && step->believed;
 }
 
