@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "backend/incremental/incremental_solver.h"
 #include "cameras/geometry/so3.h"
@@ -53,9 +54,9 @@ IncrementalSolver::Dependence IncrementalSolver::dependence_of(const GraphVariab
     result.by_delta.push_back(std::move(by_carrier));
   } else {
     // d = -L^-T (U^T delta), and V^-1 = L^-T L^-1 around it.
-    const LandmarkTerm landmark = condensed_in_[given.index] != kNone
-                                      ? linearized_landmark(given.index)
-                                      : *landmarks_[given.index];
+    std::optional<LandmarkTerm> condensed;
+    if (condensed_in_[given.index] != kNone) condensed = linearized_landmark(given.index);
+    const LandmarkTerm& landmark = condensed ? *condensed : *landmarks_[given.index];
     if (!landmark.solvable) {
       result.own = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
       return result;

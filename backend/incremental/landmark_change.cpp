@@ -24,14 +24,16 @@ constexpr double kNoChange = 30;
 void IncrementalSolver::note_reach(LandmarkTerm& landmark) const {
   std::size_t size = 0;
   for (const std::uint32_t v : landmark.poses) size += static_cast<std::size_t>(tree_.size(v));
-  landmark.reach.assign(size + 6, 0);
-  landmark.evaluated_at.assign(size, 0);
+  if (!landmark.change) landmark.change = std::make_unique<LandmarkChange>();
+  std::vector<float>& all = landmark.change->reach;
+  all.assign(size + 6, 0);
+  landmark.change->evaluated_at.assign(size, 0);
   if (landmark.anchor == LandmarkTerm::kNoAnchor) return;
   const Eigen::Vector3d place = pose_with(landmark.anchor).tangent.place;
   Vector6d in_common = Vector6d::Zero();
   Eigen::Matrix<double, Eigen::Dynamic, 6> common;
   const auto add = [&](std::uint32_t variable, const auto& jacobian) {
-    float* reach = landmark.reach.data();
+    float* reach = all.data();
     for (const std::uint32_t v : landmark.poses) {
       if (v == variable) break;
       reach += tree_.size(v);
@@ -65,13 +67,13 @@ void IncrementalSolver::note_reach(LandmarkTerm& landmark) const {
     in_common += common.colwise().squaredNorm().transpose();
   }
   for (Eigen::Index i = 0; i < 6; ++i) {
-    landmark.reach[size + static_cast<std::size_t>(i)] = static_cast<float>(in_common[i]);
+    all[size + static_cast<std::size_t>(i)] = static_cast<float>(in_common[i]);
   }
-  for (float& reach : landmark.reach) reach = std::sqrt(reach);
+  for (float& reach : all) reach = std::sqrt(reach);
 }
 
 void IncrementalSolver::note_evaluated(LandmarkTerm& landmark) const {
-  float* to = landmark.evaluated_at.data();
+  float* to = landmark.change->evaluated_at.data();
   for (const std::uint32_t v : landmark.poses) {
     for (const double value : tree_.delta_of(v)) *to++ = static_cast<float>(value);
   }
@@ -87,15 +89,15 @@ bool IncrementalSolver::has_changed(const Term& term) const {
 bool IncrementalSolver::has_changed(const LandmarkTerm& landmark) const {
   if (landmark.anchor == LandmarkTerm::kNoAnchor) return true;
   const Eigen::Vector3d place = pose_with(landmark.anchor).tangent.place;
-  const float* before = landmark.evaluated_at.data();
+  const float* before = landmark.change->evaluated_at.data();
   for (const std::uint32_t v : landmark.poses) {
     if (v == landmark.anchor) break;
     before += tree_.size(v);
   }
   const Vector6d common = tree_.delta(landmark.anchor) -
                           Eigen::Map<const Eigen::Matrix<float, 6, 1>>(before).cast<double>();
-  const float* reach = landmark.reach.data();
-  before = landmark.evaluated_at.data();
+  const float* reach = landmark.change->reach.data();
+  before = landmark.change->evaluated_at.data();
   const double allowed = kNoChange * std::sqrt(options_.relinearization);
   double change = 0;
   for (const std::uint32_t v : landmark.poses) {

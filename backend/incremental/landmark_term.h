@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "backend/incremental/marginalization.h"
@@ -41,6 +42,14 @@ struct FactorView {
   Eigen::Matrix<double, Eigen::Dynamic, 3> reduced;  // by_variables^T by_point L^-T
 };
 
+// What tells whether a landmark with factors has to be evaluated (IncrementalSolver::has_changed):
+// by how much the residuals change with each component of `poses`, and with each of a motion in
+// common; the deltas of `poses` when it was evaluated last.
+struct LandmarkChange {
+  std::vector<float> reach;
+  std::vector<float> evaluated_at;
+};
+
 // All observations of a landmark, with the landmark eliminated (Schur complement): what is left is
 // a term on the poses that see it,
 //   H(i, j) = [i = j] by_pose_i^T by_pose_i - reduced_i reduced_j^T.
@@ -60,11 +69,7 @@ struct LandmarkTerm {
   bool solvable = false;                                  // the views determine the point
   // What a judged step leaves out of the displacement, since with it the cost would be higher.
   Eigen::Vector3d held_back = Eigen::Vector3d::Zero();
-  // Of a landmark with factors (IncrementalSolver::has_changed): by how much the residuals change
-  // with each component of `poses`, and with each of a motion in common; the deltas of `poses` when
-  // it was evaluated last.
-  std::vector<float> reach;
-  std::vector<float> evaluated_at;
+  std::unique_ptr<LandmarkChange> change;  // null where there are no factors
 
   // How many views and factors can be used.
   std::size_t usable_count() const;
