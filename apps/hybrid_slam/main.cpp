@@ -71,7 +71,7 @@ class ReplayInput final : public RunInput {
 // of no use to the map in another's: 28 MB more after 100 frames of 1024x768, and not faster.
 void share_heap() {
 #ifdef __GLIBC__
-  mallopt(M_ARENA_MAX, 1);
+  mallopt(M_ARENA_MAX, 1);  // NOLINT(concurrency-mt-unsafe): no other thread is there yet
 #endif
 }
 

@@ -141,6 +141,7 @@ void MappingWorker::end_update(LocalUpdate update) {
   updating_ = false;
   const std::vector<KeyframeResult> added = std::exchange(in_update_, {});
   std::vector<KeyframeId> ids;
+  ids.reserve(added.size());
   for (const KeyframeResult& keyframe : added) ids.push_back(keyframe.id);
   mapping_.end_update(std::move(update), ids, times_);
   const auto closing = std::exchange(closing_, std::nullopt);

@@ -98,7 +98,7 @@ bool IncrementalSolver::linearize_factor(const Factor& factor, const Eigen::Vect
   double* next = derivatives.data();
   for (std::size_t k = 0; k < sizes.size(); ++k) {
     jacobians.data()[k] = next;
-    next += count * sizes[k];
+    next += std::ptrdiff_t{count} * sizes[k];
   }
   rows.residual.setZero(count);
   rows.jacobian.setZero(count, offsets.back());

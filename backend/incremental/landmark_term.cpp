@@ -94,7 +94,7 @@ void LandmarkTerm::assemble_mixed(Front& front) const {
                                             poses.begin())];
   };
   const Eigen::Index size = offsets[count];
-  Scratch<double, 3 * 6 * 16> numbers(static_cast<std::size_t>(3 * size));
+  Scratch<double, 3 * 6 * 16> numbers(3 * static_cast<std::size_t>(size));
   Eigen::Map<Eigen::MatrixX3d> sum(numbers.data(), size, 3);
   sum.setZero();
   for (const LandmarkView& view : views) {

@@ -68,7 +68,7 @@ int largest_quota(const std::vector<int>& available, const std::vector<int>& tak
 std::vector<int> select_spread(const std::vector<Keypoint>& keypoints, int width, int height,
                                int max_count) {
   const auto at = [&](int i) -> const Keypoint& { return keypoints[static_cast<std::size_t>(i)]; };
-  const std::vector<int> order = by_strength(keypoints, width, height);
+  std::vector<int> order = by_strength(keypoints, width, height);
   if (std::ssize(order) <= max_count) return order;
 
   const SpreadGrid grid = make_spread_grid(width, height, max_count);
