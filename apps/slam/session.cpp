@@ -167,8 +167,8 @@ class Session::Work {
       while (auto item = stream_.next()) {
         for (const LeftOut& input : item->left_out) leave_out(input);
         if (item->frame) take(std::move(*item->frame));
-        const std::lock_guard lock(
-            mutex_);  // or track() could look just before and wait just after
+        // Without it track() could look just before and wait just after.
+        const std::lock_guard lock(mutex_);
         changed_.notify_all();
       }
       core_->finish(is_cancelled());
