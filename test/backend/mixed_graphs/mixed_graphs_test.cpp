@@ -139,6 +139,19 @@ TEST_CASE("mixed graphs: with no tolerance, the optimum to the last digits") {
   }
 }
 
+// Nothing but the calibration is measured anew, so that all else is old terms, which have to
+// notice.
+TEST_CASE("mixed graphs: landmarks follow a calibration that moves far") {
+  MixedFeed feed(calibration_graph(12), {});
+  while (!feed.done()) feed.feed_next();
+  IncrementalSolver& solver = feed.solver();
+  Eigen::Matrix<double, 5, 1> elsewhere = solver.block(0);
+  elsewhere.head<4>() += Eigen::Vector4d(40, 30, -20, 20);
+  solver.add_factor({value_factor<5>(elsewhere, 0.1), {block_variable(0)}});
+  for (int i = 0; i < 10; ++i) solver.update();
+  CHECK(std::abs(excess(solver)) < 1e-3);
+}
+
 // Half the squared residuals of what joins poses, without what holds one of them.
 double inner_cost(FactorGraph graph) {
   std::erase_if(graph.factors, [](const GraphFactor& f) { return f.variables.size() == 1; });
