@@ -11,6 +11,7 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -18,6 +19,7 @@
 
 #include "apps/slam/frame_extractor.h"
 #include "apps/slam/replay.h"
+#include "cameras/files/input_error.h"
 #include "cameras/geometry/se3.h"
 #include "frontend/input/image_sequence.h"
 #include "frontend/input/trajectory_file.h"
@@ -50,6 +52,10 @@ struct Figures {
   }
 
   void print() const {
+    if (motions == 0) {
+      std::printf("no motion with a truth\n");
+      return;
+    }
     const double n = motions;
     std::printf(
         "%d motions, %d missing, %.0f inliers: length %+.3f %%, %.3f mm, %.4f deg, NEES %.2f\n",
@@ -109,11 +115,19 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: odometer_accuracy DATASET SEQUENCE [FRAMES [STEP [TRUTH]]]\n");
     return 2;
   }
-  const auto sequence = open_sequence(argv[1], SequenceLayout::kAuto, argv[2]);
-  const std::size_t frames =
-      argc > 3 ? std::min(sequence->size(), std::stoul(argv[3])) : sequence->size();
-  const std::size_t step = argc > 4 ? std::stoul(argv[4]) : 1;
-  run(*sequence, frames, step, argc > 5 ? read_trajectory(argv[5]).poses : sequence->info().truth)
-      .print();
+  try {
+    const auto sequence = open_sequence(argv[1], SequenceLayout::kAuto, argv[2]);
+    const std::size_t frames =
+        argc > 3 ? std::min(sequence->size(), std::stoul(argv[3])) : sequence->size();
+    const std::size_t step = argc > 4 ? std::stoul(argv[4]) : 1;
+    run(*sequence, frames, step, argc > 5 ? read_trajectory(argv[5]).poses : sequence->info().truth)
+        .print();
+  } catch (const InputError& error) {
+    std::fprintf(stderr, "odometer_accuracy: error: %s\n", error.what());
+    return 1;
+  } catch (const std::logic_error&) {
+    std::fprintf(stderr, "odometer_accuracy: error: FRAMES and STEP are whole numbers\n");
+    return 2;
+  }
   return 0;
 }
