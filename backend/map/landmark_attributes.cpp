@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace hybrid_slam {
 
@@ -23,6 +25,25 @@ int squared_distance(const Descriptor& a, const Descriptor& b) {
 
 const FrameObservations& frame_of(const MapTables& tables, KeyframeId id) {
   return *tables.keyframes.find(id.value)->observations;
+}
+
+Eigen::Vector3d center_of(const MapTables& tables, KeyframeId id) {
+  return origin_in_a(tables.keyframes.find(id.value)->cam_from_world);
+}
+
+template <typename CenterOf>
+void update_geometry(const MapTables& tables, Landmark& landmark, CenterOf&& center) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Observation& observation : landmark.observations) {
+    const Eigen::Vector3d ray = landmark.point_in_world - center(observation.keyframe);
+    sum += ray.normalized();
+    if (observation.keyframe == landmark.reference) {
+      const FrameObservations& frame = frame_of(tables, observation.keyframe);
+      const double scale = frame.features.keypoints[observation.keypoint].scale;
+      landmark.object_scale = scale / focal_length(tables.cameras[frame.camera.value]) * ray.norm();
+    }
+  }
+  landmark.mean_direction = sum.normalized();
 }
 
 }  // namespace
@@ -55,19 +76,24 @@ void update_appearance(const MapTables& tables, Landmark& landmark) {
   landmark.descriptor = *seen[best];
 }
 
+CameraCenters::CameraCenters(const MapTables& tables)
+    : tables_(tables),
+      centers_(tables.next_keyframe,
+               Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())) {}
+
+const Eigen::Vector3d& CameraCenters::of(KeyframeId id) {
+  Eigen::Vector3d& center = centers_[id.value];
+  if (std::isnan(center.x())) center = center_of(tables_, id);
+  return center;
+}
+
 void update_geometry(const MapTables& tables, Landmark& landmark) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Observation& observation : landmark.observations) {
-    const Keyframe& keyframe = *tables.keyframes.find(observation.keyframe.value);
-    const Eigen::Vector3d ray = landmark.point_in_world - origin_in_a(keyframe.cam_from_world);
-    sum += ray.normalized();
-    if (observation.keyframe == landmark.reference) {
-      const FrameObservations& frame = *keyframe.observations;
-      const double scale = frame.features.keypoints[observation.keypoint].scale;
-      landmark.object_scale = scale / focal_length(tables.cameras[frame.camera.value]) * ray.norm();
-    }
-  }
-  landmark.mean_direction = sum.normalized();
+  update_geometry(tables, landmark, [&](KeyframeId id) { return center_of(tables, id); });
+}
+
+void update_geometry(const MapTables& tables, CameraCenters& centers, Landmark& landmark) {
+  update_geometry(tables, landmark,
+                  [&](KeyframeId id) -> const Eigen::Vector3d& { return centers.of(id); });
 }
 
 bool is_supported(const MapTables& tables, const Landmark& landmark) {

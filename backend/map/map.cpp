@@ -1,6 +1,8 @@
 #include "backend/map/map.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <stdexcept>
 #include <utility>
 
@@ -65,6 +67,34 @@ void count(PersistentTable<Landmark>& landmarks, const std::vector<LandmarkCount
     landmark.found += one.found;
   }
 }
+
+// Landmarks, each once, however often it was marked.
+class MarkedLandmarks {
+ public:
+  explicit MarkedLandmarks(std::uint32_t ids) : words_(ids / kBits + 1) {}
+
+  // Nothing for one that there never was.
+  void mark(LandmarkId id) {
+    if (id.value / kBits < words_.size()) words_[id.value / kBits] |= bit(id.value % kBits);
+  }
+
+  // Ascending.
+  template <typename F>
+  void for_each(F&& f) const {
+    for (std::size_t i = 0; i < words_.size(); ++i) {
+      for (std::uint64_t left = words_[i]; left != 0; left &= left - 1) {
+        const auto id = i * kBits + static_cast<std::size_t>(std::countr_zero(left));
+        f(LandmarkId(static_cast<std::uint32_t>(id)));
+      }
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kBits = 64;
+  static constexpr std::uint64_t bit(std::uint32_t i) { return std::uint64_t{1} << i; }
+
+  std::vector<std::uint64_t> words_;
+};
 
 }  // namespace
 
@@ -150,34 +180,31 @@ void Map::move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world
   for (const auto& [id, point] : point_in_world) {
     require(point.allFinite(), "Map::move: point is not finite");
   }
-  std::vector<LandmarkId> changed;
+  MarkedLandmarks changed(tables.next_landmark);
   for (const auto& [id, pose] : cam_from_world) {
     Keyframe* const keyframe = tables.keyframes.edit_if(id.value);
     if (keyframe == nullptr) continue;
     keyframe->cam_from_world = pose;
-    for (const LandmarkId seen : keyframe->landmarks) {
-      if (seen.valid()) changed.push_back(seen);
-    }
+    for (const LandmarkId seen : keyframe->landmarks) changed.mark(seen);
   }
   // Each landmark is looked up once: there are thousands, none of which is in a cache.
   std::vector<std::pair<LandmarkId, const Eigen::Vector3d*>> places;
   places.reserve(point_in_world.size());
   for (const auto& [id, point] : point_in_world) {
     places.emplace_back(id, &point);
-    changed.push_back(id);
+    changed.mark(id);
   }
   std::stable_sort(places.begin(), places.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::sort(changed.begin(), changed.end());
-  changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+  CameraCenters centers(tables);
   auto place = places.begin();
-  for (const LandmarkId id : changed) {
+  changed.for_each([&](LandmarkId id) {
     Landmark* const landmark = tables.landmarks.edit_if(id.value);
     for (; place != places.end() && place->first == id; ++place) {
       if (landmark != nullptr) landmark->point_in_world = *place->second;
     }
-    if (landmark != nullptr) update_geometry(tables, *landmark);
-  }
+    if (landmark != nullptr) update_geometry(tables, centers, *landmark);
+  });
 }
 
 void Map::set_camera(CameraId id, const Camera& camera) {
