@@ -1,38 +1,39 @@
 #include "backend/problem/loop_correction.h"
 
 #include <algorithm>
-#include <map>
-#include <unordered_set>
+#include <iterator>
+#include <optional>
 
 namespace hybrid_slam {
 
 namespace {
 
-// new_world_from_old_world at each keyframe of a loop graph that varies.
-std::map<KeyframeId, Sim3d> corrections(const MapSnapshot& map, const MapGraph& solved) {
-  std::map<KeyframeId, Sim3d> moved;
-  const FactorGraph& graph = solved.graph;
-  for (std::size_t i = 0; i < solved.frames.size(); ++i) {
-    const bool scaled = !graph.similarities.empty();
-    if (scaled ? graph.similarities[i].fixed : graph.frames[i].fixed) continue;
-    const Sim3d cam_from_new =
-        scaled ? graph.similarities[i].cam_from_world : Sim3d(graph.frames[i].cam_from_world);
-    const Sim3d cam_from_old(map.at(solved.frames[i]).cam_from_world);
-    moved.emplace(solved.frames[i], inverse(cam_from_new) * cam_from_old);
-  }
-  return moved;
-}
+// new_world_from_old_world of keyframes, by their ids, which are dense: thousands of landmarks ask.
+template <typename Transform>
+class MovesOf {
+ public:
+  explicit MovesOf(const MapSnapshot& map) : moves_(map.next_keyframe_id().value) {}
 
-// new_world_from_old_world of keyframes.
-using Moves = std::map<KeyframeId, Rigid3d>;
+  void add(KeyframeId id, const Transform& new_from_old) { moves_[id.value] = new_from_old; }
+
+  // Null where none was added.
+  const Transform* find(KeyframeId id) const {
+    const bool known = id.value < moves_.size() && moves_[id.value];
+    return known ? &*moves_[id.value] : nullptr;
+  }
+
+ private:
+  std::vector<std::optional<Transform>> moves_;
+};
+
+using Moves = MovesOf<Rigid3d>;
 
 // Of those that a result moves.
 Moves moves_of(const MapSnapshot& now, const BundleResult& result) {
-  Moves moves;
+  Moves moves(now);
   for (const auto& [id, cam_from_new] : result.cam_from_world) {
     const Keyframe* keyframe = now.find(id);
-    if (keyframe == nullptr) continue;
-    moves.emplace(id, inverse(cam_from_new) * keyframe->cam_from_world);
+    if (keyframe != nullptr) moves.add(id, inverse(cam_from_new) * keyframe->cam_from_world);
   }
   return moves;
 }
@@ -42,14 +43,14 @@ class Carrier {
  public:
   Carrier(const MapSnapshot& now, const BundleResult& result)
       : now_(now), new_from_old_(moves_of(now, result)) {
-    new_from_old_.emplace(now.origin(), Rigid3d());
+    if (!moved(now.origin())) new_from_old_.add(now.origin(), Rigid3d());
   }
 
-  bool moved(KeyframeId id) const { return new_from_old_.contains(id); }
+  bool moved(KeyframeId id) const { return new_from_old_.find(id) != nullptr; }
 
   const Rigid3d& new_from_old(KeyframeId id) const {
     while (!moved(id)) id = now_.at(id).parent;  // ends at the origin
-    return new_from_old_.at(id);
+    return *new_from_old_.find(id);
   }
 
  private:
@@ -60,17 +61,25 @@ class Carrier {
 }  // namespace
 
 void write_loop_correction(const MapSnapshot& map, const MapGraph& solved, BundleResult& result) {
-  const std::map<KeyframeId, Sim3d> moved = corrections(map, solved);
+  const FactorGraph& graph = solved.graph;
+  MovesOf<Sim3d> moves(map);
   result.cam_from_world.clear();
-  for (const auto& [id, new_from_old] : moved) {
+  for (std::size_t i = 0; i < solved.frames.size(); ++i) {
+    const bool scaled = !graph.similarities.empty();
+    if (scaled ? graph.similarities[i].fixed : graph.frames[i].fixed) continue;
+    const Sim3d cam_from_new =
+        scaled ? graph.similarities[i].cam_from_world : Sim3d(graph.frames[i].cam_from_world);
+    const KeyframeId id = solved.frames[i];
     const Sim3d cam_from_old(map.at(id).cam_from_world);
+    const Sim3d new_from_old = inverse(cam_from_new) * cam_from_old;
+    moves.add(id, new_from_old);
     result.cam_from_world.emplace_back(id, without_scale(cam_from_old * inverse(new_from_old)));
   }
   for (const LandmarkId id : map.landmark_ids()) {
     const Landmark& landmark = map.at(id);
-    const auto reference = moved.find(landmark.reference);
-    if (reference == moved.end()) continue;
-    result.point_in_world.emplace_back(id, reference->second * landmark.point_in_world);
+    if (const Sim3d* new_from_old = moves.find(landmark.reference)) {
+      result.point_in_world.emplace_back(id, *new_from_old * landmark.point_in_world);
+    }
   }
 }
 
@@ -87,20 +96,16 @@ LoopMove move_of(const MapSnapshot& before, const BundleResult& correction) {
 }
 
 void carry_over(const LoopMove& move, const MapSnapshot& now, BundleResult& result) {
-  const auto find = [&](KeyframeId id) -> const Rigid3d* {
-    const auto place =
-        std::lower_bound(move.begin(), move.end(), id,
-                         [](const auto& one, KeyframeId key) { return one.first < key; });
-    return place != move.end() && place->first == id ? &place->second : nullptr;
-  };
+  Moves moves(now);
+  for (const auto& [id, new_from_old] : move) moves.add(id, new_from_old);
   for (auto& [id, cam_from_world] : result.cam_from_world) {
-    if (const Rigid3d* new_from_old = find(id)) {
+    if (const Rigid3d* new_from_old = moves.find(id)) {
       cam_from_world = cam_from_world * inverse(*new_from_old);
     }
   }
   for (auto& [id, point_in_world] : result.point_in_world) {
     const Landmark* landmark = now.find(id);
-    const Rigid3d* new_from_old = landmark != nullptr ? find(landmark->reference) : nullptr;
+    const Rigid3d* new_from_old = landmark != nullptr ? moves.find(landmark->reference) : nullptr;
     if (new_from_old != nullptr) point_in_world = *new_from_old * point_in_world;
   }
 }
@@ -113,10 +118,15 @@ void carry_the_rest(const MapSnapshot& now, BundleResult& result) {
         now.at(id).cam_from_world * inverse(carrier.new_from_old(now.at(id).parent));
     result.cam_from_world.emplace_back(id, cam_from_new);
   }
-  std::unordered_set<LandmarkId> known;
-  for (const auto& [id, point] : result.point_in_world) known.insert(id);
-  for (const LandmarkId id : now.landmark_ids()) {
-    if (known.contains(id)) continue;
+  std::vector<LandmarkId> known;
+  known.reserve(result.point_in_world.size());
+  for (const auto& [id, point] : result.point_in_world) known.push_back(id);
+  std::sort(known.begin(), known.end());
+  const std::vector<LandmarkId> all = now.landmark_ids();
+  std::vector<LandmarkId> others;
+  std::set_difference(all.begin(), all.end(), known.begin(), known.end(),
+                      std::back_inserter(others));
+  for (const LandmarkId id : others) {
     const Landmark& landmark = now.at(id);
     result.point_in_world.emplace_back(
         id, carrier.new_from_old(landmark.reference) * landmark.point_in_world);
@@ -130,18 +140,18 @@ void carry_newcomers(const MapSnapshot& then, const MapSnapshot& now, BundleResu
   for (const KeyframeId id : now.keyframe_ids_from(first)) {
     // Where a keyframe was erased meanwhile, one may hang from one that is newer.
     KeyframeId above = now.at(id).parent;
-    while (above >= first && !moves.contains(above)) above = now.at(above).parent;
-    if (!moves.contains(above)) continue;
-    const Rigid3d new_from_old = moves.at(above);
+    while (above >= first && moves.find(above) == nullptr) above = now.at(above).parent;
+    if (moves.find(above) == nullptr) continue;
+    const Rigid3d new_from_old = *moves.find(above);
     result.cam_from_world.emplace_back(id, now.at(id).cam_from_world * inverse(new_from_old));
-    moves.emplace(id, new_from_old);
+    moves.add(id, new_from_old);
   }
   for (const LandmarkId id : now.changed_landmarks(then)) {
     const Landmark* landmark = then.find(id) == nullptr ? now.find(id) : nullptr;
     if (landmark == nullptr) continue;
-    const auto reference = moves.find(landmark->reference);
-    if (reference == moves.end()) continue;
-    result.point_in_world.emplace_back(id, reference->second * landmark->point_in_world);
+    const Rigid3d* new_from_old = moves.find(landmark->reference);
+    if (new_from_old == nullptr) continue;
+    result.point_in_world.emplace_back(id, *new_from_old * landmark->point_in_world);
   }
 }
 
