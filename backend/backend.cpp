@@ -195,9 +195,9 @@ MapSmoother& Backend::smoother() {
 }
 
 LoopOutcome Backend::close(const LoopMeasurement& loop) {
+  require_no_update("close");
   LoopOutcome outcome;
   if (view().find(loop.keyframe) == nullptr || view().find(loop.match) == nullptr) return outcome;
-  catch_up();
   write_discrepancy(view(), loop, outcome);
   bring_together(loop);
   refused_.push_back(by_present_keypoints(view(), loop));  // until it is taken

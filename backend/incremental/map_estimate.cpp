@@ -96,7 +96,9 @@ void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
 void MapSmoother::write(const MapSnapshot& map, const std::vector<KeyframeId>& keyframes,
                         std::vector<LandmarkId> seen, BundleResult& result) {
   for (const KeyframeId id : keyframes) {
-    result.cam_from_world.emplace_back(id, solver_->pose(pose_of_[id.value]));
+    const std::uint32_t pose = pose_of_[id.value];
+    told_[pose] = solver_->pose(pose);
+    result.cam_from_world.emplace_back(id, told_[pose]);
   }
   for (const LandmarkId id : seen_by(map, keyframes, std::move(seen))) {
     const auto found = landmarks_.find(id);
@@ -168,8 +170,12 @@ BundleResult MapSmoother::rest(const MapSnapshot& map) {
 
 // By how much the map is behind the estimate [m, rad].
 double MapSmoother::off_by(const Keyframe& keyframe) const {
-  return (solver_->pose(pose_of_[keyframe.id.value]).params - keyframe.cam_from_world.params)
-      .lpNorm<Eigen::Infinity>();
+  return distance(solver_->pose(pose_of_[keyframe.id.value]), keyframe.cam_from_world);
+}
+
+// [m, rad]
+double MapSmoother::distance(const Rigid3d& a, const Rigid3d& b) {
+  return (a.params - b.params).lpNorm<Eigen::Infinity>();
 }
 
 // Nobody has moved the keyframe since the last update.

@@ -87,6 +87,7 @@ void MapSmoother::renumber(KeyframeId keyframe, std::span<const std::uint32_t> k
 }
 
 // A loop was closed, or everything adjusted: the map is no longer where the last result left it.
+// The estimate moves as the map did, so that what the map was not told yet is not lost.
 void MapSmoother::follow_moves(const MapSnapshot& map) {
   if (known_map_ == nullptr) return;
   std::vector<std::pair<std::uint32_t, Rigid3d>> moved;
@@ -94,9 +95,11 @@ void MapSmoother::follow_moves(const MapSnapshot& map) {
     const Keyframe* keyframe = map.find(id);
     if (keyframe == nullptr || id.value >= pose_of_.size() || id == map.origin()) continue;
     if (stayed(*keyframe)) continue;  // the map has yet to follow the estimate
-    if (off_by(*keyframe) > options_.min_motion) {
-      moved.emplace_back(pose_of_[id.value], keyframe->cam_from_world);
-    }
+    const std::uint32_t pose = pose_of_[id.value];
+    Rigid3d& told = told_[pose];
+    if (!(distance(told, keyframe->cam_from_world) > options_.min_motion)) continue;
+    moved.emplace_back(pose, solver_->pose(pose) * inverse(told) * keyframe->cam_from_world);
+    told = keyframe->cam_from_world;
   }
   if (!moved.empty()) solver_->move_poses(moved);
 }
@@ -114,8 +117,12 @@ void MapSmoother::take_in_keyframes(const MapSnapshot& map, KeyframeId last) {
     const std::uint32_t pose = solver_->add_pose(
         {keyframe->cam_from_world, keyframe->observations->camera.value, id == map.origin()});
     pose_of_.back() = pose;
-    if (pose == keyframe_of_.size()) keyframe_of_.emplace_back();
+    if (pose == keyframe_of_.size()) {
+      keyframe_of_.emplace_back();
+      told_.emplace_back();
+    }
     keyframe_of_[pose] = id;
+    told_[pose] = keyframe->cam_from_world;
   }
 }
 

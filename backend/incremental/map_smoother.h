@@ -63,8 +63,8 @@ class MapSmoother {
     return update(std::move(map), {&newest, 1}, stop);
   }
 
-  // What results have yet to say of keyframes that moved, all of it; to be taken in before others
-  // move the map, and at the end. `map`: the last update's, with what came since.
+  // What results have yet to say of keyframes that moved, all of it; to be taken in at the end.
+  // `map`: the last update's, with what came since.
   BundleResult rest(const MapSnapshot& map);
 
   // How certain the keyframes are, as of the last update: of the map's newest one of each camera,
@@ -100,6 +100,7 @@ class MapSmoother {
   void let_keyframes_go(const MapSnapshot& map);
   void follow_moves(const MapSnapshot& map);
   double off_by(const Keyframe& keyframe) const;
+  static double distance(const Rigid3d& a, const Rigid3d& b);
   bool stayed(const Keyframe& keyframe) const;
   void take_in_loops(const MapSnapshot& map);
   bool is_news(const MapSnapshot& map, LandmarkId id) const;
@@ -122,6 +123,7 @@ class MapSmoother {
   std::size_t camera_count_ = 0;
   std::vector<std::uint32_t> pose_of_;   // by keyframe
   std::vector<KeyframeId> keyframe_of_;  // by pose
+  std::vector<Rigid3d> told_;            // by pose: where the map has it once results are taken in
   std::vector<KeyframeId> gone_;         // keyframes whose poses the solver has still
   std::vector<std::uint32_t> behind_;    // poses of which the map has yet to be told; ascending
   std::vector<LandmarkId> doubted_;      // whose views the last update set aside; ascending
