@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "backend/map/components.h"
 #include "backend/map/disparity_shift.h"
 #include "backend/map/dropped_features.h"
 #include "backend/problem/loop_correction.h"
@@ -14,32 +13,6 @@ namespace hybrid_slam {
 
 namespace {
 
-// Loops over which an adjustment of everything that takes its time is carried.
-constexpr std::size_t kMaxMoves = 16;
-
-PoseConstraint constraint_of(const LoopMeasurement& loop) {
-  PoseConstraint constraint;
-  constraint.a = loop.keyframe;
-  constraint.b = loop.match;
-  constraint.a_from_b = loop.keyframe_from_match;
-  constraint.loop = true;
-  return constraint;
-}
-
-std::vector<PoseConstraint> constraints_of(const std::vector<LoopMeasurement>& loops) {
-  std::vector<PoseConstraint> constraints;
-  constraints.reserve(loops.size());
-  for (const LoopMeasurement& loop : loops) constraints.push_back(constraint_of(loop));
-  return constraints;
-}
-
-std::vector<LoopEnds> ends_of(const std::vector<PoseConstraint>& loops) {
-  std::vector<LoopEnds> ends;
-  ends.reserve(loops.size());
-  for (const PoseConstraint& loop : loops) ends.emplace_back(loop.a, loop.b);
-  return ends;
-}
-
 // Observations by keypoints of one keyframe; those that it no longer has go.
 void renumber(std::vector<LandmarkObservation>& observations,
               const std::vector<std::uint32_t>& kept) {
@@ -48,24 +21,6 @@ void renumber(std::vector<LandmarkObservation>& observations,
     one.observation.keypoint = keypoint.value_or(one.observation.keypoint);
     return !keypoint;
   });
-}
-
-// The measurement by the keypoints that the map has now: without what it names of others.
-LoopMeasurement by_present_keypoints(const MapSnapshot& map, LoopMeasurement loop) {
-  if (loop.observations != nullptr && loop.observations != map.at(loop.keyframe).observations) {
-    loop.new_observations.clear();
-  }
-  loop.observations.reset();
-  return loop;
-}
-
-// How far the map's newer keyframe is from where the loop sees it.
-void write_discrepancy(const MapSnapshot& map, const LoopMeasurement& loop, LoopOutcome& outcome) {
-  const Rigid3d by_map =
-      map.at(loop.keyframe).cam_from_world * inverse(map.at(loop.match).cam_from_world);
-  const Rigid3d off = inverse(without_scale(loop.keyframe_from_match)) * by_map;
-  outcome.translation = off.translation().norm();
-  outcome.rotation = so3_log(off.rotation()).norm();
 }
 
 }  // namespace
@@ -192,93 +147,6 @@ MapSmoother& Backend::smoother() {
     for (const PoseConstraint& loop : closed_) smoother_->add_loop(loop);
   }
   return *smoother_;
-}
-
-LoopOutcome Backend::close(const LoopMeasurement& loop) {
-  require_no_update("close");
-  LoopOutcome outcome;
-  if (view().find(loop.keyframe) == nullptr || view().find(loop.match) == nullptr) return outcome;
-  write_discrepancy(view(), loop, outcome);
-  bring_together(loop);
-  refused_.push_back(by_present_keypoints(view(), loop));  // until it is taken
-  LoopClosureOptions options = options_.loops;
-  for (const LoopMeasurement& one : refused_) options.graph.with_scale |= one.with_scale;
-  const LoopClosure closure =
-      close_loop(view(), constraints_of(refused_), ends_of(closed_), options);
-  outcome.chi2 = closure.chi2;
-  outcome.loops = static_cast<int>(closure.taken.size());
-  outcome.end = closure.taken.empty() ? LoopEnd::kImplausible : LoopEnd::kClosed;
-  if (!closure.taken.empty()) take_in(closure, options.graph);
-  const auto most = static_cast<std::size_t>(options_.max_refused_loops);
-  while (refused_.size() > most) refused_.erase(refused_.begin());
-  return outcome;
-}
-
-// The measurements are weighted and the map is moved before its sides become one: merged, they
-// would be neither here nor there.
-void Backend::take_in(const LoopClosure& closure, const LoopGraphOptions& options) {
-  std::vector<LoopMeasurement> taken;
-  moved_by_others(false);
-  for (const std::size_t i : closure.taken) {
-    PoseConstraint loop = constraint_of(refused_[i]);
-    loop.information = motion_information(view(), loop.a, loop.b, loop.a_from_b, options);
-    closed_.push_back(loop);
-    if (smoother_) smoother_->add_loop(loop);
-    taken.push_back(refused_[i]);
-  }
-  for (auto i = closure.taken.rbegin(); i != closure.taken.rend(); ++i) {
-    refused_.erase(refused_.begin() + static_cast<std::ptrdiff_t>(*i));
-  }
-  move(closure.correction);
-  if (options.with_scale) forget_moves(moves_.size());  // motions have another size now
-  for (const LoopMeasurement& loop : taken) merge_sides(loop);
-}
-
-void Backend::move(const BundleResult& correction) {
-  moves_.push_back(move_of(view(), correction));
-  if (moves_.size() > kMaxMoves) forget_moves(1);
-  map_.move(correction.cam_from_world, correction.point_in_world);
-}
-
-// Where the loop's ends lie in different components, only it says where these lie against one
-// another: one of them moves as a whole.
-void Backend::bring_together(const LoopMeasurement& loop) {
-  const KeyframeId newer_part = view().at(loop.keyframe).component;
-  const KeyframeId older_part = view().at(loop.match).component;
-  if (newer_part == older_part) return;
-  const KeyframeId origins = view().at(view().origin()).component;
-  const auto sizes = component_sizes(view());
-  const bool newer_moves = older_part == origins ||
-                           (newer_part != origins && sizes.at(newer_part) <= sizes.at(older_part));
-  const Rigid3d newer_from_older = without_scale(loop.keyframe_from_match);
-  const Rigid3d newer = view().at(loop.keyframe).cam_from_world;
-  const Rigid3d older = view().at(loop.match).cam_from_world;
-  const Rigid3d old_from_new_world = newer_moves
-                                         ? inverse(newer) * newer_from_older * older
-                                         : inverse(older) * inverse(newer_from_older) * newer;
-  const Rigid3d new_from_old_world = inverse(old_from_new_world);
-  const KeyframeId goes = newer_moves ? newer_part : older_part;
-  BundleResult correction;
-  for (const KeyframeId id : view().keyframe_ids()) {
-    if (view().at(id).component != goes) continue;
-    correction.cam_from_world.emplace_back(id, view().at(id).cam_from_world * old_from_new_world);
-  }
-  for (const LandmarkId id : view().landmark_ids()) {
-    const Landmark& landmark = view().at(id);
-    if (view().at(landmark.observations.front().keyframe).component != goes) continue;
-    correction.point_in_world.emplace_back(id, new_from_old_world * landmark.point_in_world);
-  }
-  move(correction);
-}
-
-void Backend::merge_sides(const LoopMeasurement& loop) {
-  MapEdit edit;
-  edit.merged = loop.same;
-  edit.new_observations = loop.new_observations;
-  map_.apply(edit);
-  map_.set_keep(loop.keyframe);
-  map_.set_keep(loop.match);
-  map_.join_components(loop.keyframe, loop.match);
 }
 
 BundleResult solve_full(const MapSnapshot& map, const FullBundleOptions& options,

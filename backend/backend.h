@@ -8,6 +8,7 @@
 
 #include "backend/incremental/map_smoother.h"
 #include "backend/local_update.h"
+#include "backend/loop_update.h"
 #include "backend/map/loop_measurement.h"
 #include "backend/map/map.h"
 #include "backend/problem/full_bundle.h"
@@ -33,21 +34,6 @@ struct BackendOptions {
 
   // Empty if the values can be used, else what is wrong.
   std::string validate() const;
-};
-
-enum class LoopEnd {
-  kClosed,
-  kImplausible,  // the map cannot be bent to it at a plausible price; see close_loop()
-  kGone,         // a keyframe of it is no longer in the map
-};
-
-// What became of a loop.
-struct LoopOutcome {
-  LoopEnd end = LoopEnd::kGone;
-  double translation = 0;  // by which the loop's newer keyframe was off from it [m]
-  double rotation = 0;     // [rad]
-  double chi2 = 0;         // of the map bent to it
-  int loops = 0;           // taken: more than one where others agreed with it
 };
 
 // The synchronous facade of the backend: owns the map, applies what the frontend sends, optimises.
@@ -95,6 +81,11 @@ class Backend {
   // changes nothing, but is remembered: a later one may agree with it.
   LoopOutcome close(const LoopMeasurement& loop);
 
+  // The same in steps, between which keyframes may be added and edits applied, as between those of
+  // a local update: what came since is carried along.
+  LoopUpdate begin_close(const LoopMeasurement& loop);
+  LoopOutcome end_close(LoopUpdate update);
+
   // How often close() has moved the map.
   std::size_t closings() const { return first_move_ + moves_.size(); }
 
@@ -114,7 +105,7 @@ class Backend {
 
  private:
   BundleSummary take_in(BundleResult result);
-  void take_in(const LoopClosure& closure, const LoopGraphOptions& options);
+  void take_in(const LoopUpdate& update);
   void move(const BundleResult& correction);
   void bring_together(const LoopMeasurement& loop);
   void merge_sides(const LoopMeasurement& loop);
@@ -126,7 +117,7 @@ class Backend {
   BackendOptions options_;
   Map map_;
   std::optional<MapSmoother> smoother_;   // in step with the map
-  bool updating_ = false;                 // between begin_local() and end_local()
+  bool updating_ = false;                 // between begin_...() and end_...()
   std::vector<LoopMeasurement> refused_;  // oldest first
   std::vector<PoseConstraint> closed_;    // loops, as measured, weighted
   // What close() did to the map, for results that are still to come: the newest, oldest first.

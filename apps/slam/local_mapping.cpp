@@ -142,7 +142,9 @@ void LocalMapping::take_in(CameraId stereo, const RigCorrection& correction,
 
 LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
                                 const std::function<void()>& publish) {
-  const LoopOutcome outcome = move_to(loop, times);
+  LoopUpdate move = begin_close(loop);
+  move.run();
+  const LoopOutcome outcome = end_close(std::move(move), times);
   if (outcome.end != LoopEnd::kClosed) return outcome;
   LocalUpdate update = begin_update({&loop.keyframe, 1});
   update.run();
@@ -152,10 +154,11 @@ LoopOutcome LocalMapping::close(const LoopMeasurement& loop, StageTimes& times,
   return outcome;
 }
 
-LoopOutcome LocalMapping::move_to(const LoopMeasurement& loop, StageTimes& times) {
+LoopOutcome LocalMapping::end_close(LoopUpdate update, StageTimes& times) {
+  times.add("close_loop", 1e3 * update.seconds());
   StageClock clock(times);
-  const LoopOutcome outcome = backend_.close(loop);
-  clock.lap("close_loop");
+  const LoopOutcome outcome = backend_.end_close(std::move(update));
+  clock.lap("take_in_loop");
   return outcome;
 }
 

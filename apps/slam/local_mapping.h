@@ -82,8 +82,10 @@ class LocalMapping {
   LoopOutcome close(const LoopMeasurement& loop, StageTimes& times,
                     const std::function<void()>& publish);
 
-  // The same in steps: if it was closed, an update from its keyframe on belongs between these.
-  LoopOutcome move_to(const LoopMeasurement& loop, StageTimes& times);
+  // The same in steps: how the map must move is found out beside, see LoopUpdate; if the loop was
+  // closed, a local update from its keyframe on belongs between the last two.
+  LoopUpdate begin_close(const LoopMeasurement& loop) { return backend_.begin_close(loop); }
+  LoopOutcome end_close(LoopUpdate update, StageTimes& times);
   void fuse_sides(const LoopMeasurement& loop, StageTimes& times);
 
   // How often the map was moved by a loop.

@@ -45,7 +45,7 @@ void MappingWorker::work() {
       go_on();
     }
     while (updating_) {  // nothing new comes; what did is brought to its end
-      end_update(updates_->take());
+      end(updates_->take());
       go_on();
     }
   } catch (...) {
@@ -65,7 +65,7 @@ void MappingWorker::take(MappingJob& job) {
 }
 
 void MappingWorker::take(UpdateDone&) {
-  if (updating_ && updates_->is_done()) end_update(updates_->take());
+  if (updating_ && updates_->is_done()) end(updates_->take());
 }
 
 // While no update works: what moves the map first, then what was added is optimised.
@@ -75,7 +75,7 @@ void MappingWorker::go_on() {
       next_move();
     } else {
       in_update_ = std::exchange(inserted_, {});
-      begin_update(still_there());
+      begin(mapping_.begin_update(still_there()));
     }
   }
 }
@@ -84,7 +84,7 @@ void MappingWorker::go_on() {
 void MappingWorker::settle() {
   while (updating_ || !moves_.empty()) {
     if (updating_) {
-      end_update(updates_->take());
+      end(updates_->take());
     } else {
       next_move();
     }
@@ -109,14 +109,9 @@ std::vector<KeyframeId> MappingWorker::still_there() const {
 }
 
 void MappingWorker::run(LoopMeasurement& loop) {
-  const LoopOutcome outcome = mapping_.move_to(loop, times_);
-  if (outcome.end != LoopEnd::kClosed) {
-    events_.looped(outcome, snapshot(), mapping_.closings());
-    return;
-  }
-  publish();
-  closing_.emplace(std::move(loop), outcome);
-  begin_update({closing_->first.keyframe});
+  LoopUpdate update = mapping_.begin_close(loop);
+  closing_ = std::move(loop);
+  begin(std::move(update));
 }
 
 void MappingWorker::run(FullCorrection& correction) {
@@ -126,29 +121,46 @@ void MappingWorker::run(FullCorrection& correction) {
   events_.adjusted(snapshot());
 }
 
-void MappingWorker::begin_update(const std::vector<KeyframeId>& newest) {
-  LocalUpdate update = mapping_.begin_update(newest);
+void MappingWorker::begin(MapUpdate update) {
   if (updates_) {
     updating_ = true;
     updates_->start(std::move(update));
   } else {
-    update.run();
-    end_update(std::move(update));
+    std::visit([](auto& one) { one.run(); }, update);
+    end(std::move(update));
   }
 }
 
-void MappingWorker::end_update(LocalUpdate update) {
+void MappingWorker::end(MapUpdate update) {
   updating_ = false;
+  std::visit([this](auto& one) { end_update(std::move(one)); }, update);
+}
+
+void MappingWorker::end_update(LocalUpdate update) {
   const std::vector<KeyframeResult> added = std::exchange(in_update_, {});
   std::vector<KeyframeId> ids;
   ids.reserve(added.size());
   for (const KeyframeResult& keyframe : added) ids.push_back(keyframe.id);
   mapping_.end_update(std::move(update), ids, times_);
-  const auto closing = std::exchange(closing_, std::nullopt);
-  if (closing) mapping_.fuse_sides(closing->first, times_);
+  const auto closed = std::exchange(closed_, std::nullopt);
+  if (closed) mapping_.fuse_sides(*std::exchange(closing_, std::nullopt), times_);
   publish();
-  if (closing) events_.looped(closing->second, snapshot(), mapping_.closings());
+  if (closed) events_.looped(*closed, snapshot(), mapping_.closings());
   for (const KeyframeResult& keyframe : added) events_.mapped(keyframe, snapshot());
+}
+
+// The map as it was moved is optimised around the loop next.
+void MappingWorker::end_update(LoopUpdate update) {
+  const LoopOutcome outcome = mapping_.end_close(std::move(update), times_);
+  if (outcome.end != LoopEnd::kClosed) {
+    closing_.reset();
+    events_.looped(outcome, snapshot(), mapping_.closings());
+    return;
+  }
+  publish();
+  closed_ = outcome;
+  const KeyframeId newest = closing_->keyframe;
+  begin(mapping_.begin_update({&newest, 1}));
 }
 
 }  // namespace hybrid_slam

@@ -90,7 +90,7 @@ class MappingWorker {
   static constexpr std::size_t kKeyframeBacklog = 3;
   static constexpr std::size_t kOthers = 3;
 
-  // A local update has been run.
+  // An update has been run.
   struct UpdateDone {};
   // What moves the map: it waits until no update works.
   using Move = std::variant<LoopMeasurement, FullCorrection>;
@@ -106,8 +106,10 @@ class MappingWorker {
   void run(LoopMeasurement& loop);
   void run(FullCorrection& correction);
   std::vector<KeyframeId> still_there() const;
-  void begin_update(const std::vector<KeyframeId>& newest);
+  void begin(MapUpdate update);
+  void end(MapUpdate update);
   void end_update(LocalUpdate update);
+  void end_update(LoopUpdate update);
 
   LocalMapping& mapping_;
   MappingEvents events_;
@@ -122,8 +124,10 @@ class MappingWorker {
   std::vector<KeyframeResult> inserted_;   // since the last update began
   std::vector<KeyframeResult> in_update_;  // those that the present one optimises
   std::deque<Move> moves_;
-  std::optional<std::pair<LoopMeasurement, LoopOutcome>> closing_;  // in the present update
-  bool updating_ = false;                                           // beside
+  // A loop that is being closed; and, once the map was moved to it, with its outcome.
+  std::optional<LoopMeasurement> closing_;
+  std::optional<LoopOutcome> closed_;
+  bool updating_ = false;  // beside
   std::optional<UpdateWorker> updates_;
   std::jthread thread_;
 };

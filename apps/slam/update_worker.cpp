@@ -14,7 +14,7 @@ UpdateWorker::~UpdateWorker() {
   results_.close();
 }
 
-LocalUpdate UpdateWorker::take() {
+MapUpdate UpdateWorker::take() {
   auto update = results_.pop();
   if (!update) std::rethrow_exception(failure_);
   return std::move(*update);
@@ -24,7 +24,7 @@ void UpdateWorker::work() {
   give_way();
   try {
     while (auto update = updates_.pop()) {
-      update->run();
+      std::visit([](auto& one) { one.run(); }, *update);
       results_.push(std::move(*update));
       done_();
     }

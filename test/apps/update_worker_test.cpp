@@ -32,7 +32,7 @@ TEST_CASE("an update that was run beside is what it would have been in the calle
     worker.start(beside.begin_local({&newest, 1}));
     REQUIRE(told.pop());
     CHECK(worker.is_done());
-    CHECK(beside.end_local(worker.take()).variable_landmarks > 0);
+    CHECK(beside.end_local(std::get<LocalUpdate>(worker.take())).variable_landmarks > 0);
   }
   CHECK_FALSE(worker.is_done());
   const auto pose = [](const MapSnapshot& map, KeyframeId id) {

@@ -87,7 +87,7 @@ struct OpenCircle {
 
   double worst_error() const {
     double worst = 0;
-    for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    for (std::size_t i = 0; i < scene.frames.size(); ++i) {
       const auto at = origin_in_a(backend.view().at(keyframes[i]).cam_from_world);
       worst = std::max(worst, (at - origin_in_a(scene.frames[i].cam_from_world)).norm());
     }
@@ -158,47 +158,78 @@ TEST_CASE("backend: an adjustment of everything is carried over a loop that was 
   CHECK(circle.worst_error() < 0.02);
 }
 
+// What came into the map between `began` and `before`, this keyframe and landmarks that it alone
+// sees, lies before the keyframe it hangs from as it did.
+void check_carried(const MapSnapshot& began, const MapSnapshot& before, KeyframeId newcomer,
+                   const MapSnapshot& now) {
+  const KeyframeId parent = before.at(newcomer).parent;
+  const Rigid3d moved = now.at(parent).cam_from_world * inverse(before.at(parent).cam_from_world);
+  REQUIRE(moved.translation().norm() > 1e-3);
+  const auto in_parent = [&](const MapSnapshot& map) {
+    return map.at(newcomer).cam_from_world * inverse(map.at(parent).cam_from_world);
+  };
+  CHECK((in_parent(now).params - in_parent(before).params).norm() < 1e-12);
+  int carried = 0;
+  for (const LandmarkId id : now.landmark_ids()) {
+    if (began.find(id) != nullptr) continue;
+    const Eigen::Vector3d was = before.at(newcomer).cam_from_world * before.at(id).point_in_world;
+    const Eigen::Vector3d is = now.at(newcomer).cam_from_world * now.at(id).point_in_world;
+    CHECK((is - was).norm() < 1e-9);
+    ++carried;
+  }
+  CHECK(carried > 10);
+}
+
+// While an update works: nothing else moves the map.
+void check_nothing_moves(Backend& backend, const LoopMeasurement& loop, KeyframeId newcomer) {
+  const auto before = backend.snapshot();
+  CHECK_THROWS_AS(backend.optimize_local(newcomer), std::logic_error);
+  CHECK_THROWS_AS(backend.close(loop), std::logic_error);
+  CHECK_THROWS_AS(backend.take_in_full({}, 0), std::logic_error);
+  CHECK_THROWS_AS(backend.catch_up(), std::logic_error);
+  CHECK_THROWS_AS(backend.drop_features({newcomer}), std::logic_error);
+  CHECK(before->changed_keyframes(backend.view()).empty());
+}
+
+// A keyframe beside that of this time; all that it sees is new.
+KeyframeId add_stranger(OpenCircle& circle, int time) {
+  circle.second.assign(circle.second.size(), LandmarkId());
+  circle.add(time);
+  return circle.keyframes.back();
+}
+
 TEST_CASE("backend: what comes in while a local update works is carried along") {
   Backend backend(chain_backend());
   OpenCircle circle(backend);
   LocalUpdate update = backend.begin_local(std::vector{circle.keyframes.back()});
   const auto began = backend.snapshot();
-  circle.second.assign(circle.second.size(), LandmarkId());
-  circle.add(25);  // once more, and all that it sees is new
-  const KeyframeId newcomer = circle.keyframes.back();
+  const KeyframeId newcomer = add_stranger(circle, 25);
   const auto before = backend.snapshot();
-  CHECK_THROWS_AS(backend.optimize_local(newcomer), std::logic_error);
-  CHECK_THROWS_AS(backend.close(circle.loop()), std::logic_error);
-  CHECK_THROWS_AS(backend.take_in_full({}, 0), std::logic_error);
-  CHECK_THROWS_AS(backend.catch_up(), std::logic_error);
-  CHECK_THROWS_AS(backend.drop_features({newcomer}), std::logic_error);
-  CHECK(before->changed_keyframes(backend.view()).empty());
-
+  check_nothing_moves(backend, circle.loop(), newcomer);
   update.run();
   backend.end_local(std::move(update));
-  const auto in_parent = [&](const MapSnapshot& map) {
-    return map.at(newcomer).cam_from_world *
-           inverse(map.at(before->at(newcomer).parent).cam_from_world);
-  };
-  const KeyframeId parent = before->at(newcomer).parent;
-  const Rigid3d moved =
-      backend.view().at(parent).cam_from_world * inverse(before->at(parent).cam_from_world);
-  REQUIRE(moved.translation().norm() > 1e-3);
-  CHECK((in_parent(backend.view()).params - in_parent(*before).params).norm() < 1e-12);
-  int carried = 0;
-  for (const LandmarkId id : backend.view().landmark_ids()) {
-    const Landmark& landmark = backend.view().at(id);
-    if (began->find(id) != nullptr) continue;
-    const Eigen::Vector3d then =
-        before->at(newcomer).cam_from_world * before->at(id).point_in_world;
-    const Eigen::Vector3d now =
-        backend.view().at(newcomer).cam_from_world * landmark.point_in_world;
-    CHECK((now - then).norm() < 1e-9);
-    ++carried;
-  }
-  CHECK(carried > 10);
+  check_carried(*began, *before, newcomer, backend.view());
   CHECK(backend.map().check_consistency() == std::vector<std::string>{});
   CHECK(backend.close(circle.loop()).end == LoopEnd::kClosed);
+}
+
+TEST_CASE("backend: what comes in while a loop is being closed is carried along") {
+  Backend backend(chain_backend());
+  OpenCircle circle(backend);
+  const LoopMeasurement loop = circle.loop();
+  LoopUpdate update = backend.begin_close(loop);
+  const auto began = backend.snapshot();
+  const KeyframeId newcomer = add_stranger(circle, 25);
+  const auto before = backend.snapshot();
+  check_nothing_moves(backend, loop, newcomer);
+  CHECK(backend.closings() == 0);
+  update.run();
+  const double open = circle.worst_error();
+  CHECK(backend.end_close(std::move(update)).end == LoopEnd::kClosed);
+  CHECK(backend.closings() == 1);
+  CHECK(circle.worst_error() < 0.7 * open);
+  check_carried(*began, *before, newcomer, backend.view());
+  CHECK(backend.map().check_consistency() == std::vector<std::string>{});
 }
 
 TEST_CASE("backend: a map that is too large for one adjustment has it in windows") {
