@@ -94,7 +94,7 @@ BundleSummary Backend::optimize_local(KeyframeId newest, const std::stop_token& 
 LocalUpdate Backend::begin_local(std::span<const KeyframeId> newest) {
   require_no_update("begin_local");
   if (newest.empty()) throw std::logic_error("Backend::begin_local: no keyframe");
-  LocalUpdate update(snapshot(), {newest.begin(), newest.end()});
+  LocalUpdate update(map_, {newest.begin(), newest.end()});
   update.local_ = options_.local;
   if (options_.local_method == LocalMethod::kIncremental) update.smoother_ = &smoother();
   updating_ = true;
@@ -104,30 +104,56 @@ LocalUpdate Backend::begin_local(std::span<const KeyframeId> newest) {
 void LocalUpdate::run(const std::stop_token& stop) {
   if (smoother_ == nullptr) {
     result_ = solve_bundle(*map_, make_local_bundle(*map_, newest_, local_), stop);
-    return;
+  } else {
+    result_ = smoother_->update(map_, newest_, stop);
+    covariances_ = smoother_->covariances(*map_);
   }
-  result_ = smoother_->update(map_, newest_, stop);
-  covariances_ = smoother_->covariances(*map_);
+  moved_.move(result_.cam_from_world, result_.point_in_world);
 }
 
 BundleSummary Backend::end_local(LocalUpdate update) {
-  if (!updating_) throw std::logic_error("Backend::end_local: no local update was begun");
-  updating_ = false;
-  carry_newcomers(*update.map_, view(), update.result_);
-  BundleSummary summary = take_in(std::move(update.result_));
+  require_update("end_local");
+  take_in_moves(*update.map_, std::move(update.moved_), update.result_);
+  erase(std::move(update.result_.outliers));
   if (update.covariances_ != nullptr) map_.set_covariances(std::move(update.covariances_));
-  return summary;
+  return update.result_.summary;
 }
 
 void Backend::require_no_update(const char* what) const {
   if (updating_) {
-    throw std::logic_error(std::string("Backend::") + what + ": a local update is not ended");
+    throw std::logic_error(std::string("Backend::") + what + ": an update is not ended");
   }
+}
+
+// It ends with this.
+void Backend::require_update(const char* what) {
+  if (!std::exchange(updating_, false)) {
+    throw std::logic_error(std::string("Backend::") + what + ": no update was begun");
+  }
+}
+
+// The map moves as the branch did by this result, which gets what came into the map since: it is
+// carried along.
+void Backend::take_in_moves(const MapSnapshot& then, Map moved, BundleResult& result) {
+  const auto poses = std::ssize(result.cam_from_world);
+  const auto points = std::ssize(result.point_in_world);
+  carry_newcomers(then, view(), result);
+  map_.take_in_moves(then, std::move(moved));
+  map_.move({result.cam_from_world.begin() + poses, result.cam_from_world.end()},
+            {result.point_in_world.begin() + points, result.point_in_world.end()});
+}
+
+void Backend::erase(std::vector<LandmarkObservation> outliers) {
+  MapEdit edit;
+  edit.erased_observations = std::move(outliers);
+  map_.apply(edit);
 }
 
 void Backend::catch_up() {
   require_no_update("catch_up");
-  if (smoother_) take_in(smoother_->rest(view()));
+  if (!smoother_) return;
+  const BundleResult rest = smoother_->rest(view());
+  map_.move(rest.cam_from_world, rest.point_in_world);
 }
 
 // The oldest.
@@ -155,30 +181,47 @@ BundleResult solve_full(const MapSnapshot& map, const FullBundleOptions& options
 }
 
 BundleSummary Backend::take_in_full(BundleResult result, std::size_t closings_then) {
-  require_no_update("take_in_full");
+  FullUpdate update = begin_full(std::move(result), closings_then);
+  update.run();
+  return end_full(std::move(update));
+}
+
+FullUpdate Backend::begin_full(BundleResult result, std::size_t closings_then) {
+  require_no_update("begin_full");
   if (closings_then > closings()) {
-    throw std::logic_error("Backend::take_in_full: a result of loops that were not closed");
+    throw std::logic_error("Backend::begin_full: a result of loops that were not closed");
   }
-  if (closings_then < first_move_) return result.summary;
+  updating_ = true;
+  FullUpdate update(std::move(result));
+  if (closings_then < first_move_) return update;
   forget_moves(closings_then - first_move_);
-  if (result.cam_from_world.empty()) return result.summary;
-  for (const LoopMove& move : moves_) carry_over(move, view(), result);
+  if (update.result_.cam_from_world.empty()) return update;
+  update.map_ = map_.snapshot();
+  update.moved_ = map_.branch();
+  update.moves_ = moves_;
+  return update;
+}
+
+void FullUpdate::run() {
+  if (map_ == nullptr) return;
+  for (const LoopMove& move : moves_) carry_over(move, *map_, result_);
+  carry_the_rest(*map_, result_);
+  moved_.move(result_.cam_from_world, result_.point_in_world);
+}
+
+BundleSummary Backend::end_full(FullUpdate update) {
+  require_update("end_full");
+  BundleResult& result = update.result_;
+  if (update.map_ == nullptr) return result.summary;
   moved_by_others(!result.cameras.empty());
-  carry_the_rest(view(), result);
-  return take_in(std::move(result));
+  take_in_moves(*update.map_, std::move(update.moved_), result);
+  for (const auto& [id, camera] : result.cameras) map_.set_camera(id, camera);
+  erase(std::move(result.outliers));
+  return result.summary;
 }
 
 BundleSummary Backend::optimize_full(const std::stop_token& stop) {
   return take_in_full(solve_full(view(), options_.full, stop), closings());
-}
-
-BundleSummary Backend::take_in(BundleResult result) {
-  for (const auto& [id, camera] : result.cameras) map_.set_camera(id, camera);
-  map_.move(result.cam_from_world, result.point_in_world);
-  MapEdit edit;
-  edit.erased_observations = std::move(result.outliers);
-  map_.apply(edit);
-  return result.summary;
 }
 
 std::shared_ptr<const MapSnapshot> Backend::snapshot() { return map_.snapshot(); }

@@ -6,6 +6,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "backend/full_update.h"
 #include "backend/incremental/map_smoother.h"
 #include "backend/local_update.h"
 #include "backend/loop_update.h"
@@ -96,6 +97,10 @@ class Backend {
   // are remembered, or than one that changed scales.
   BundleSummary take_in_full(BundleResult result, std::size_t closings_then);
 
+  // The same in steps, as those of a loop.
+  FullUpdate begin_full(BundleResult result, std::size_t closings_then);
+  BundleSummary end_full(FullUpdate update);
+
   // Bundle adjustment of everything but the origin: solve_full and take_in_full.
   BundleSummary optimize_full(const std::stop_token& stop = {});
 
@@ -104,8 +109,11 @@ class Backend {
   const Map& map() const { return map_; }
 
  private:
-  BundleSummary take_in(BundleResult result);
-  void take_in(const LoopUpdate& update);
+  void require_update(const char* what);
+  void take_in_moves(const MapSnapshot& then, Map moved, BundleResult& result);
+  void erase(std::vector<LandmarkObservation> outliers);
+  void take_in(LoopUpdate& update);
+  void remember_move(const MapSnapshot& before, const BundleResult& correction);
   void move(const BundleResult& correction);
   void bring_together(const LoopMeasurement& loop);
   void merge_sides(const LoopMeasurement& loop);

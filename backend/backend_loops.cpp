@@ -1,5 +1,4 @@
 #include <chrono>
-#include <stdexcept>
 #include <utility>
 
 #include "backend/backend.h"
@@ -62,6 +61,7 @@ void LoopUpdate::run() {
   if (map_ == nullptr) return;
   const auto start = std::chrono::steady_clock::now();
   closure_ = close_loop(*map_, loops_, closed_, options_);
+  moved_.move(closure_.correction.cam_from_world, closure_.correction.point_in_world);
   seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
@@ -83,22 +83,19 @@ LoopUpdate Backend::begin_close(const LoopMeasurement& loop) {
   update.closed_ = ends_of(closed_);
   update.options_ = options_.loops;
   for (const LoopMeasurement& one : refused_) update.options_.graph.with_scale |= one.with_scale;
-  update.map_ = snapshot();
+  update.map_ = map_.snapshot();
+  update.moved_ = map_.branch();
   return update;
 }
 
 LoopOutcome Backend::end_close(LoopUpdate update) {
-  if (!updating_) throw std::logic_error("Backend::end_close: no loop is being closed");
-  updating_ = false;
+  require_update("end_close");
   if (update.map_ == nullptr) return update.outcome_;
   const bool taken = !update.closure_.taken.empty();
   update.outcome_.chi2 = update.closure_.chi2;
   update.outcome_.loops = static_cast<int>(update.closure_.taken.size());
   update.outcome_.end = taken ? LoopEnd::kClosed : LoopEnd::kImplausible;
-  if (taken) {
-    carry_newcomers(*update.map_, view(), update.closure_.correction);
-    take_in(update);
-  }
+  if (taken) take_in(update);
   const auto most = static_cast<std::size_t>(options_.max_refused_loops);
   while (refused_.size() > most) refused_.erase(refused_.begin());
   return update.outcome_;
@@ -106,7 +103,7 @@ LoopOutcome Backend::end_close(LoopUpdate update) {
 
 // The measurements are weighted and the map is moved before its sides become one: merged, they
 // would be neither here nor there.
-void Backend::take_in(const LoopUpdate& update) {
+void Backend::take_in(LoopUpdate& update) {
   const LoopGraphOptions& options = update.options_.graph;
   const std::vector<std::size_t>& indices = update.closure_.taken;
   std::vector<LoopMeasurement> taken;
@@ -121,14 +118,21 @@ void Backend::take_in(const LoopUpdate& update) {
   for (auto i = indices.rbegin(); i != indices.rend(); ++i) {
     refused_.erase(refused_.begin() + static_cast<std::ptrdiff_t>(*i));
   }
-  move(update.closure_.correction);
+  BundleResult& correction = update.closure_.correction;
+  const auto before = snapshot();
+  take_in_moves(*update.map_, std::move(update.moved_), correction);
+  remember_move(*before, correction);
   if (options.with_scale) forget_moves(moves_.size());  // motions have another size now
   for (const LoopMeasurement& loop : taken) merge_sides(loop);
 }
 
-void Backend::move(const BundleResult& correction) {
-  moves_.push_back(move_of(view(), correction));
+void Backend::remember_move(const MapSnapshot& before, const BundleResult& correction) {
+  moves_.push_back(move_of(before, correction));
   if (moves_.size() > kMaxMoves) forget_moves(1);
+}
+
+void Backend::move(const BundleResult& correction) {
+  remember_move(view(), correction);
   map_.move(correction.cam_from_world, correction.point_in_world);
 }
 

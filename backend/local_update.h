@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "backend/map/map_snapshot.h"
+#include "backend/map/map.h"
 #include "backend/problem/local_bundle.h"
 #include "backend/problem/problem_config.h"
 
@@ -25,10 +25,11 @@ class LocalUpdate {
 
  private:
   friend class Backend;
-  LocalUpdate(std::shared_ptr<const MapSnapshot> map, std::vector<KeyframeId> newest)
-      : map_(std::move(map)), newest_(std::move(newest)) {}
+  LocalUpdate(Map& map, std::vector<KeyframeId> newest)
+      : map_(map.snapshot()), moved_(map.branch()), newest_(std::move(newest)) {}
 
   std::shared_ptr<const MapSnapshot> map_;
+  Map moved_;  // branched there
   std::vector<KeyframeId> newest_;
   MapSmoother* smoother_ = nullptr;  // or null: bundle adjustment of the keyframes' surroundings
   LocalBundleOptions local_;

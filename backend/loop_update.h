@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "backend/map/loop_measurement.h"
-#include "backend/map/map_snapshot.h"
+#include "backend/map/map.h"
 #include "backend/problem/loop_closure.h"
 
 namespace hybrid_slam {
@@ -39,6 +39,7 @@ class LoopUpdate {
   LoopUpdate() = default;
 
   std::shared_ptr<const MapSnapshot> map_;  // null: there is nothing to close
+  Map moved_;                               // branched there
   std::vector<PoseConstraint> loops_;       // that are not taken yet; the newest last
   std::vector<LoopEnds> closed_;
   LoopClosureOptions options_;

@@ -168,12 +168,16 @@ void LocalMapping::fuse_sides(const LoopMeasurement& loop, StageTimes& times) {
   clock.lap("fuse");
 }
 
-void LocalMapping::take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times,
-                                const std::function<void()>& publish) {
+void LocalMapping::take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times) {
+  FullUpdate update = begin_full(std::move(result), closings_then);
+  update.run();
+  end_full(std::move(update), times);
+}
+
+void LocalMapping::end_full(FullUpdate update, StageTimes& times) {
   StageClock clock(times);
-  backend_.take_in_full(std::move(result), closings_then);
+  backend_.end_full(std::move(update));
   clock.lap("take_in_full_bundle");
-  publish();
 }
 
 void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& publish) {
@@ -181,7 +185,8 @@ void LocalMapping::adjust_full(StageTimes& times, const std::function<void()>& p
   StageClock clock(times);
   BundleResult result = solve_full(backend_.view(), options_.backend.full);
   clock.lap("full_bundle");
-  take_in_full(std::move(result), backend_.closings(), times, publish);
+  take_in_full(std::move(result), backend_.closings(), times);
+  publish();
 }
 
 void LocalMapping::conclude(const TrackingEnd& end) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "apps/io/stage_times.h"
@@ -92,10 +93,15 @@ class LocalMapping {
   std::size_t closings() const { return backend_.closings(); }
 
   // Takes in what solve_full() made of a snapshot, when that many loops had moved the map.
-  void take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times,
-                    const std::function<void()>& publish);
+  void take_in_full(BundleResult result, std::size_t closings_then, StageTimes& times);
 
-  // The same at once, if the options want it for a map of this size.
+  // The same in steps, see FullUpdate.
+  FullUpdate begin_full(BundleResult result, std::size_t closings_then) {
+    return backend_.begin_full(std::move(result), closings_then);
+  }
+  void end_full(FullUpdate update, StageTimes& times);
+
+  // Adjusts everything at once, if the options want it for a map of this size.
   void adjust_full(StageTimes& times, const std::function<void()>& publish);
 
   // Nothing comes after it. Landmarks too young to have been judged are judged by what was counted

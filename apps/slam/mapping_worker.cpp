@@ -115,10 +115,8 @@ void MappingWorker::run(LoopMeasurement& loop) {
 }
 
 void MappingWorker::run(FullCorrection& correction) {
-  mapping_.take_in_full(std::move(correction.result), correction.loops_closed, times_,
-                        [this] { publish(); });
   loops_adjusted_ = correction.loops_closed;
-  events_.adjusted(snapshot());
+  begin(mapping_.begin_full(std::move(correction.result), correction.loops_closed));
 }
 
 void MappingWorker::begin(MapUpdate update) {
@@ -161,6 +159,12 @@ void MappingWorker::end_update(LoopUpdate update) {
   closed_ = outcome;
   const KeyframeId newest = closing_->keyframe;
   begin(mapping_.begin_update({&newest, 1}));
+}
+
+void MappingWorker::end_update(FullUpdate update) {
+  mapping_.end_full(std::move(update), times_);
+  publish();
+  events_.adjusted(snapshot());
 }
 
 }  // namespace hybrid_slam

@@ -110,6 +110,7 @@ class MappingWorker {
   void end(MapUpdate update);
   void end_update(LocalUpdate update);
   void end_update(LoopUpdate update);
+  void end_update(FullUpdate update);
 
   LocalMapping& mapping_;
   MappingEvents events_;

@@ -138,7 +138,7 @@ class RealtimeCore final : public SlamCore {
     std::size_t adjusted = mapping_.loops_adjusted();
     if (auto correction = full_bundle_->take_correction()) {
       adjusted = correction->loops_closed;
-      local_mapping_.take_in_full(std::move(correction->result), adjusted, times_, [] {});
+      local_mapping_.take_in_full(std::move(correction->result), adjusted, times_);
     }
     if (local_mapping_.closings() > adjusted) local_mapping_.adjust_full(times_, [] {});
     mapping_.publish();

@@ -8,13 +8,14 @@
 #include <variant>
 
 #include "apps/slam/channel.h"
+#include "backend/full_update.h"
 #include "backend/local_update.h"
 #include "backend/loop_update.h"
 
 namespace hybrid_slam {
 
 // What is found out about a snapshot of the map before the map takes it in.
-using MapUpdate = std::variant<LocalUpdate, LoopUpdate>;
+using MapUpdate = std::variant<LocalUpdate, LoopUpdate, FullUpdate>;
 
 // Runs updates in a thread of its own, one at a time: while it works, keyframes come into the
 // map without waiting.

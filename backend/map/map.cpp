@@ -1,14 +1,13 @@
 #include "backend/map/map.h"
 
 #include <algorithm>
-#include <bit>
-#include <cstdint>
 #include <stdexcept>
 #include <utility>
 
 #include "backend/map/dropped_features.h"
 #include "backend/map/landmark_attributes.h"
 #include "backend/map/map_transaction.h"
+#include "backend/map/marked_landmarks.h"
 #include "backend/map/odometry.h"
 #include "backend/map/spanning_tree.h"
 
@@ -67,34 +66,6 @@ void count(PersistentTable<Landmark>& landmarks, const std::vector<LandmarkCount
     landmark.found += one.found;
   }
 }
-
-// Landmarks, each once, however often it was marked.
-class MarkedLandmarks {
- public:
-  explicit MarkedLandmarks(std::uint32_t ids) : words_(ids / kBits + 1) {}
-
-  // Nothing for one that there never was.
-  void mark(LandmarkId id) {
-    if (id.value / kBits < words_.size()) words_[id.value / kBits] |= bit(id.value % kBits);
-  }
-
-  // Ascending.
-  template <typename F>
-  void for_each(F&& f) const {
-    for (std::size_t i = 0; i < words_.size(); ++i) {
-      for (std::uint64_t left = words_[i]; left != 0; left &= left - 1) {
-        const auto id = i * kBits + static_cast<std::size_t>(std::countr_zero(left));
-        f(LandmarkId(static_cast<std::uint32_t>(id)));
-      }
-    }
-  }
-
- private:
-  static constexpr std::uint32_t kBits = 64;
-  static constexpr std::uint64_t bit(std::uint32_t i) { return std::uint64_t{1} << i; }
-
-  std::vector<std::uint64_t> words_;
-};
 
 }  // namespace
 

@@ -28,6 +28,13 @@ class Map {
   void move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world,
             const std::vector<std::pair<LandmarkId, Eigen::Vector3d>>& point_in_world);
 
+  // The same in steps, of which the second may be done in any thread while this map goes on: a map
+  // of its own with this content, which costs next to nothing; move() on that; then it is taken in.
+  // `then`: a snapshot of this map as the branch was made. Until the end nothing else may have
+  // moved this map; what was done to it since stays done. Costs what changed since.
+  Map branch();
+  void take_in_moves(const MapSnapshot& then, Map branch);
+
   // Those of two keyframes become one, named by the older: their places against one another are
   // known from now on. Nothing where they are one already, or a keyframe is gone.
   void join_components(KeyframeId a, KeyframeId b);

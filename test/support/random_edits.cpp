@@ -8,7 +8,7 @@ namespace hybrid_slam {
 
 void RandomEdits::step() {
   MapEdit edit;
-  switch (random_.below(9)) {
+  switch (random_.below(with_poses_ ? 9 : 6)) {
     case 0:
       for (int i = 0; i < 3; ++i) edit.merged.push_back({landmark(), landmark()});
       break;

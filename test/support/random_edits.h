@@ -11,7 +11,9 @@ namespace hybrid_slam {
 // same edits on the same map.
 class RandomEdits {
  public:
-  RandomEdits(FilledMap& filled, std::uint64_t seed) : filled_(filled), random_(seed) {}
+  // `with_poses`: keyframes come, go and move, too.
+  RandomEdits(FilledMap& filled, std::uint64_t seed, bool with_poses = true)
+      : filled_(filled), random_(seed), with_poses_(with_poses) {}
 
   void step();
 
@@ -26,6 +28,7 @@ class RandomEdits {
 
   FilledMap& filled_;
   Random random_;
+  bool with_poses_;
 };
 
 }  // namespace hybrid_slam
