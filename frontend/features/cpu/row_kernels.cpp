@@ -1,7 +1,9 @@
 #include "frontend/features/cpu/row_kernels.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <iterator>
 
 #include "frontend/features/definition/extremum.h"
 
@@ -88,62 +90,92 @@ void sum_rows(const float* const* rows, std::size_t count, const float* weights,
                [&](std::size_t x, Vector sum) HWY_ATTR { hn::StoreU(sum, d, out + x); });
 }
 
-void sum_rows_and_subtract(const float* const* rows, std::size_t count, const float* weights,
-                           std::size_t width, float* HWY_RESTRICT out,
-                           const float* HWY_RESTRICT below, float* HWY_RESTRICT difference) {
-  const Floats d;
-  for_each_sum(rows, count, weights, width, [&](std::size_t x, Vector sum) HWY_ATTR {
-    hn::StoreU(sum, d, out + x);
-    hn::StoreU(hn::Sub(sum, hn::LoadU(d, below + x)), d, difference + x);
-  });
+// The sizes of the default scales' kernels, which are constants below so that loops are unrolled:
+// the weights, and what several sums read, stay in registers. 0 stands for all others.
+constexpr std::size_t kSizes[] = {9, 11, 13, 17, 21, 0};
+
+template <typename Function>
+Function for_size(std::size_t count, const std::array<Function, std::size(kSizes)>& functions) {
+  std::size_t i = 0;
+  while (kSizes[i] != 0 && kSizes[i] != count) ++i;
+  return functions[i];
 }
 
-// Two vectors of each of the four sums, of which those from `First` to `Last` have a weight for the
-// row.
-struct Block {
-  Sums left, right;
-};
+// Eight lanes: of the reads of sixteen, which lie anywhere, nearly all would cross a line of the
+// cache.
+using Eight = hn::CappedTag<float, 8>;
 
-template <int First, int Last>
-HWY_INLINE void add_to_block(const float* row, const float* weight, Block& b) {
-  const Floats d;
-  const Vector left = hn::LoadU(d, row);
-  const Vector right = hn::LoadU(d, row + hn::Lanes(d));
-  const auto add = [&](const float* of, Vector& to_left, Vector& to_right) HWY_ATTR {
-    const Vector w = hn::Set(d, *of);
-    to_left = hn::MulAdd(w, left, to_left);
-    to_right = hn::MulAdd(w, right, to_right);
-  };
-  if constexpr (First <= 0 && 0 <= Last) add(weight, b.left.v0, b.right.v0);
-  if constexpr (First <= 1 && 1 <= Last) add(weight - 1, b.left.v1, b.right.v1);
-  if constexpr (First <= 2 && 2 <= Last) add(weight - 2, b.left.v2, b.right.v2);
-  if constexpr (First <= 3 && 3 <= Last) add(weight - 3, b.left.v3, b.right.v3);
+template <std::size_t kCount>
+void blur_row(const float* HWY_RESTRICT row, std::size_t count, const float* HWY_RESTRICT weights,
+              std::size_t width, float* HWY_RESTRICT out, const float* HWY_RESTRICT below,
+              float* HWY_RESTRICT difference) {
+  const Eight d;
+  using V = hn::Vec<Eight>;
+  const std::size_t lanes = hn::Lanes(d);
+  const std::size_t last = (kCount > 0 ? kCount : count) - 1;
+  const std::size_t middle = last / 2;
+  for (std::size_t x = 0; x < width; x += 2 * lanes) {
+    const float* at = row + x;
+    const V weight = hn::Set(d, weights[middle]);
+    V left = hn::Mul(weight, hn::LoadU(d, at + middle));
+    V right = hn::Mul(weight, hn::LoadU(d, at + middle + lanes));
+#pragma GCC unroll 16
+    for (std::size_t i = 0; i < middle; ++i) {
+      const V w = hn::Set(d, weights[i]);
+      const float* from = at + i;
+      const float* to = at + last - i;
+      left = hn::MulAdd(w, hn::Add(hn::LoadU(d, from), hn::LoadU(d, to)), left);
+      right = hn::MulAdd(w, hn::Add(hn::LoadU(d, from + lanes), hn::LoadU(d, to + lanes)), right);
+    }
+    hn::StoreU(left, d, out + x);
+    hn::StoreU(right, d, out + x + lanes);
+    hn::StoreU(hn::Sub(left, hn::LoadU(d, below + x)), d, difference + x);
+    hn::StoreU(hn::Sub(right, hn::LoadU(d, below + x + lanes)), d, difference + x + lanes);
+  }
 }
 
-void sum_block(const float* const* HWY_RESTRICT rows, std::size_t count,
-               const float* HWY_RESTRICT weights, std::size_t width, float* const* out) {
+void blur_row_and_subtract(const float* row, std::size_t count, const float* weights,
+                           std::size_t width, float* out, const float* below, float* difference) {
+  const std::array functions{&blur_row<9>,  &blur_row<11>, &blur_row<13>,
+                             &blur_row<17>, &blur_row<21>, &blur_row<0>};
+  for_size(count, functions)(row, count, weights, width, out, below, difference);
+}
+
+template <std::size_t kCount>
+void blur_columns(const float* const* HWY_RESTRICT rows, std::size_t count,
+                  const float* HWY_RESTRICT weights, std::size_t width,
+                  float* const* HWY_RESTRICT out) {
   static_assert(kBlockRows == 4);
   const Floats d;
-  const std::size_t lanes = hn::Lanes(d);
-  for (std::size_t x = 0; x < width; x += 2 * lanes) {
-    const Vector zero = hn::Zero(d);
-    Block b{{zero, zero, zero, zero}, {zero, zero, zero, zero}};
-    add_to_block<0, 0>(rows[0] + x, weights, b);
-    add_to_block<0, 1>(rows[1] + x, weights + 1, b);
-    add_to_block<0, 2>(rows[2] + x, weights + 2, b);
-    for (std::size_t i = 3; i < count; ++i) add_to_block<0, 3>(rows[i] + x, weights + i, b);
-    add_to_block<1, 3>(rows[count] + x, weights + count, b);
-    add_to_block<2, 3>(rows[count + 1] + x, weights + count + 1, b);
-    add_to_block<3, 3>(rows[count + 2] + x, weights + count + 2, b);
-    const auto store = [&](Vector left, Vector right, float* to) HWY_ATTR {
-      hn::StoreU(left, d, to + x);
-      if (x + lanes < width) hn::StoreU(right, d, to + x + lanes);
-    };
-    store(b.left.v0, b.right.v0, out[0]);
-    store(b.left.v1, b.right.v1, out[1]);
-    store(b.left.v2, b.right.v2, out[2]);
-    store(b.left.v3, b.right.v3, out[3]);
+  const std::size_t last = (kCount > 0 ? kCount : count) - 1;
+  const std::size_t middle = last / 2;
+  for (std::size_t x = 0; x < width; x += hn::Lanes(d)) {
+    const auto at = [&](std::size_t row) HWY_ATTR { return hn::LoadU(d, rows[row] + x); };
+    const Vector weight = hn::Set(d, weights[middle]);
+    Sums s{hn::Mul(weight, at(middle)), hn::Mul(weight, at(middle + 1)),
+           hn::Mul(weight, at(middle + 2)), hn::Mul(weight, at(middle + 3))};
+#pragma GCC unroll 16
+    for (std::size_t i = 0; i < middle; ++i) {
+      const Vector w = hn::Set(d, weights[i]);
+      const auto both = [&](std::size_t j)
+                            HWY_ATTR { return hn::Add(at(j + i), at(j + last - i)); };
+      s.v0 = hn::MulAdd(w, both(0), s.v0);
+      s.v1 = hn::MulAdd(w, both(1), s.v1);
+      s.v2 = hn::MulAdd(w, both(2), s.v2);
+      s.v3 = hn::MulAdd(w, both(3), s.v3);
+    }
+    hn::StoreU(s.v0, d, out[0] + x);
+    hn::StoreU(s.v1, d, out[1] + x);
+    hn::StoreU(s.v2, d, out[2] + x);
+    hn::StoreU(s.v3, d, out[3] + x);
   }
+}
+
+void sum_block(const float* const* rows, std::size_t count, const float* weights, std::size_t width,
+               float* const* out) {
+  const std::array functions{&blur_columns<9>,  &blur_columns<11>, &blur_columns<13>,
+                             &blur_columns<17>, &blur_columns<21>, &blur_columns<0>};
+  for_size(count, functions)(rows, count, weights, width, out);
 }
 
 void bytes_to_floats(const std::uint8_t* HWY_RESTRICT in, std::size_t width,
@@ -157,6 +189,38 @@ void bytes_to_floats(const std::uint8_t* HWY_RESTRICT in, std::size_t width,
     hn::StoreU(hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, in + x))), d, out + x);
   }
   for (; x < width; ++x) out[x] = in[x];  // nothing may be read beyond an image
+}
+
+void floats_to_fixed(const float* HWY_RESTRICT in, std::size_t width,
+                     std::uint16_t* HWY_RESTRICT out) {
+  const Floats d;
+  const hn::Rebind<std::uint16_t, Floats> d16;
+  const std::size_t lanes = hn::Lanes(d);
+  const auto fixed = [&](std::size_t x) HWY_ATTR {
+    return hn::DemoteTo(d16,
+                        hn::NearestInt(hn::Mul(hn::LoadU(d, in + x), hn::Set(d, kLevelUnits))));
+  };
+  std::size_t x = 0;
+  for (; x + lanes <= width; x += lanes) hn::StoreU(fixed(x), d16, out + x);
+  if (x == width) return;
+  HWY_ALIGN std::uint16_t rest[kRowPadding];
+  hn::StoreU(fixed(x), d16, rest);
+  std::copy_n(rest, width - x, out + x);
+}
+
+void fixed_to_floats(const std::uint16_t* HWY_RESTRICT in, std::size_t width,
+                     float* HWY_RESTRICT out) {
+  const Floats d;
+  const hn::Rebind<std::int32_t, Floats> d32;
+  const hn::Rebind<std::uint16_t, Floats> d16;
+  const std::size_t lanes = hn::Lanes(d);
+  const Vector unit = hn::Set(d, 1 / kLevelUnits);
+  std::size_t x = 0;
+  for (; x + lanes <= width; x += lanes) {
+    const Vector value = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d16, in + x)));
+    hn::StoreU(hn::Mul(value, unit), d, out + x);
+  }
+  for (; x < width; ++x) out[x] = static_cast<float>(in[x]) / kLevelUnits;
 }
 
 void interleave_rows(const float* HWY_RESTRICT even, const float* HWY_RESTRICT odd,
@@ -250,9 +314,11 @@ HWY_AFTER_NAMESPACE();
 namespace hybrid_slam::sift {
 
 HWY_EXPORT(sum_rows);
-HWY_EXPORT(sum_rows_and_subtract);
+HWY_EXPORT(blur_row_and_subtract);
 HWY_EXPORT(sum_block);
 HWY_EXPORT(bytes_to_floats);
+HWY_EXPORT(floats_to_fixed);
+HWY_EXPORT(fixed_to_floats);
 HWY_EXPORT(interleave_rows);
 HWY_EXPORT(ranges_of_columns);
 HWY_EXPORT(extrema_of_row);
@@ -262,11 +328,10 @@ void symmetric_sum(const float* const* rows, std::size_t count, const float* wei
   HWY_DYNAMIC_DISPATCH(sum_rows)(rows, count, weights, width, out);
 }
 
-void symmetric_sum_and_difference(const float* const* rows, std::size_t count, const float* weights,
+void symmetric_sum_and_difference(const float* row, std::size_t count, const float* weights,
                                   std::size_t width, float* out, const float* below,
                                   float* difference) {
-  HWY_DYNAMIC_DISPATCH(sum_rows_and_subtract)
-  (rows, count, weights, width, out, below, difference);
+  HWY_DYNAMIC_DISPATCH(blur_row_and_subtract)(row, count, weights, width, out, below, difference);
 }
 
 void sum_columns(const float* const* rows, std::size_t count, const float* weights,
@@ -276,6 +341,14 @@ void sum_columns(const float* const* rows, std::size_t count, const float* weigh
 
 void to_floats(const std::uint8_t* in, std::size_t width, float* out) {
   HWY_DYNAMIC_DISPATCH(bytes_to_floats)(in, width, out);
+}
+
+void to_fixed_point(const float* in, std::size_t width, std::uint16_t* out) {
+  HWY_DYNAMIC_DISPATCH(floats_to_fixed)(in, width, out);
+}
+
+void from_fixed_point(const std::uint16_t* in, std::size_t width, float* out) {
+  HWY_DYNAMIC_DISPATCH(fixed_to_floats)(in, width, out);
 }
 
 void interleave(const float* even, const float* odd, std::size_t width, float* out) {

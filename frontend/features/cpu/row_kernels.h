@@ -20,18 +20,30 @@ void symmetric_sum(const float* const* rows, std::size_t count, const float* wei
 // Rows that are blurred along their columns at once, so that each row is read once for all of them.
 constexpr std::size_t kBlockRows = 4;
 
-// For j = 0 .. kBlockRows - 1: out[j][x] = sum over i of weights[i] * rows[j + i][x]. There are
-// count + kBlockRows - 1 rows, none of which is written to.
+// For j = 0 .. kBlockRows - 1: out[j][x] = sum over i of weights[i] * rows[j + i][x], for symmetric
+// weights, an odd number of them. There are count + kBlockRows - 1 rows, none of which is written
+// to.
 void sum_columns(const float* const* rows, std::size_t count, const float* weights,
                  std::size_t width, float* const* out);
 
-// As symmetric_sum(), and difference[x] = out[x] - below[x].
-void symmetric_sum_and_difference(const float* const* rows, std::size_t count, const float* weights,
+// out[x] = sum over i of weights[i] * row[x + i], for symmetric weights, an odd number of them, and
+// difference[x] = out[x] - below[x].
+void symmetric_sum_and_difference(const float* row, std::size_t count, const float* weights,
                                   std::size_t width, float* out, const float* below,
                                   float* difference);
 
 // out[x] = in[x].
 void to_floats(const std::uint8_t* in, std::size_t width, float* out);
+
+// Grey levels in 16 bits: 256 to a grey level. They are rounded by 0.001 grey levels, far below the
+// noise of any image.
+inline constexpr float kLevelUnits = 256;
+
+// out[x] = in[x] * kLevelUnits, rounded, for values of 0 to 255. Writes `width` samples, no more.
+void to_fixed_point(const float* in, std::size_t width, std::uint16_t* out);
+
+// out[x] = in[x] / kLevelUnits. Reads `width` samples, no more.
+void from_fixed_point(const std::uint16_t* in, std::size_t width, float* out);
 
 // out[2 x] = even[x], out[2 x + 1] = odd[x], 2 * width samples.
 void interleave(const float* even, const float* odd, std::size_t width, float* out);

@@ -137,11 +137,9 @@ void ScaleSpace::make_level_rows(Octave& octave, std::size_t level, int y, int c
   for (int row = y; row < y + count; ++row) {
     PaddedRow& along_columns = octave.blurred[static_cast<std::size_t>(row - y)];
     along_columns.mirror();
-    const float* first = along_columns.samples() - kernel.reach();
-    for (std::size_t i = 0; i < kernel.weights.size(); ++i) pointers_[i] = first + i;
-    symmetric_sum_and_difference(pointers_.data(), kernel.weights.size(), kernel.weights.data(),
-                                 width, octave.levels[level].row(row), below.row(row),
-                                 octave.differences[level - 1].row(row));
+    symmetric_sum_and_difference(along_columns.samples() - kernel.reach(), kernel.weights.size(),
+                                 kernel.weights.data(), width, octave.levels[level].row(row),
+                                 below.row(row), octave.differences[level - 1].row(row));
   }
 }
 

@@ -23,6 +23,14 @@ std::vector<float> random_row(std::mt19937& random, std::size_t size, unsigned l
   return row;
 }
 
+std::vector<float> symmetric_weights(std::mt19937& random, std::size_t count) {
+  std::vector<float> weights(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    weights[i] = weights[count - 1 - i] = static_cast<float>(random() % 100) / 100;
+  }
+  return weights;
+}
+
 TEST_CASE("SIFT's rows are summed up with symmetric weights") {
   on_every_target([] {
     std::mt19937 random(1);
@@ -30,22 +38,39 @@ TEST_CASE("SIFT's rows are summed up with symmetric weights") {
       for (const std::size_t count : {1U, 2U, 5U, 6U, 21U}) {
         std::vector<std::vector<float>> rows;
         std::vector<const float*> pointers;
-        std::vector<float> weights(count);
         for (std::size_t i = 0; i < count; ++i) rows.push_back(random_row(random, width, 255));
         for (const auto& row : rows) pointers.push_back(row.data());
-        for (std::size_t i = 0; i < count; ++i) {
-          weights[i] = weights[count - 1 - i] = static_cast<float>(random() % 100) / 100;
-        }
-        const std::vector<float> below = random_row(random, width, 255);
-        std::vector<float> out(width + kRowPadding), again(out), difference(out);
+        const std::vector<float> weights = symmetric_weights(random, count);
+        std::vector<float> out(width + kRowPadding);
         symmetric_sum(pointers.data(), count, weights.data(), width, out.data());
-        symmetric_sum_and_difference(pointers.data(), count, weights.data(), width, again.data(),
-                                     below.data(), difference.data());
         for (std::size_t x = 0; x < width; ++x) {
           double sum = 0;
           for (std::size_t i = 0; i < count; ++i) sum += weights[i] * rows[i][x];
           REQUIRE(out[x] == Approx(sum).margin(1e-3));
-          REQUIRE(again[x] == out[x]);
+        }
+      }
+    }
+  });
+}
+
+// The kernels of the default scales, and others.
+constexpr std::size_t kCounts[] = {1, 3, 5, 9, 11, 13, 15, 17, 21, 23};
+
+TEST_CASE("SIFT's rows are blurred along themselves and subtracted") {
+  on_every_target([] {
+    std::mt19937 random(5);
+    for (const std::size_t width : {1U, 7U, 16U, 31U, 64U, 67U, 133U}) {
+      for (const std::size_t count : kCounts) {
+        const std::vector<float> row = random_row(random, width + count, 255);
+        const std::vector<float> weights = symmetric_weights(random, count);
+        const std::vector<float> below = random_row(random, width, 255);
+        std::vector<float> out(width + kRowPadding), difference(out);
+        symmetric_sum_and_difference(row.data(), count, weights.data(), width, out.data(),
+                                     below.data(), difference.data());
+        for (std::size_t x = 0; x < width; ++x) {
+          double sum = 0;
+          for (std::size_t i = 0; i < count; ++i) sum += weights[i] * row[x + i];
+          REQUIRE(out[x] == Approx(sum).margin(1e-3));
           REQUIRE(difference[x] == out[x] - below[x]);
         }
       }
@@ -57,14 +82,11 @@ TEST_CASE("SIFT's columns are summed up, a block of rows at once") {
   on_every_target([] {
     std::mt19937 random(4);
     for (const std::size_t width : {1U, 16U, 31U, 67U}) {
-      for (const std::size_t count : {3U, 5U, 21U}) {
+      for (const std::size_t count : kCounts) {
         std::vector<std::vector<float>> rows, out;
         std::vector<const float*> pointers;
         std::vector<float*> targets;
-        std::vector<float> weights;
-        for (std::size_t i = 0; i < count; ++i) {
-          weights.push_back(static_cast<float>(random() % 100) / 100);
-        }
+        const std::vector<float> weights = symmetric_weights(random, count);
         for (std::size_t i = 0; i < count + kBlockRows - 1; ++i) {
           rows.push_back(random_row(random, width, 255));
         }
@@ -99,6 +121,26 @@ TEST_CASE("SIFT's rows are read and interleaved") {
         REQUIRE(both[2 * x] == bytes[x]);
         REQUIRE(both[2 * x + 1] == bytes[x] + 0.5F);
       }
+    }
+  });
+}
+
+TEST_CASE("SIFT's rows become fixed-point numbers and floats again") {
+  on_every_target([] {
+    for (const std::size_t width : {1U, 15U, 16U, 61U}) {
+      std::vector<float> floats(width + kRowPadding), back(floats);
+      for (std::size_t x = 0; x < width; ++x) {
+        floats[x] = 255 - 3.7F * static_cast<float>(x);
+      }
+      std::vector<std::uint16_t> fixed(width + 1, 9);
+      to_fixed_point(floats.data(), width, fixed.data());
+      from_fixed_point(fixed.data(), width, back.data());
+      for (std::size_t x = 0; x < width; ++x) {
+        REQUIRE(fixed[x] == std::lround(floats[x] * kLevelUnits));
+        REQUIRE(back[x] == static_cast<float>(fixed[x]) / kLevelUnits);
+      }
+      CHECK(fixed[width] == 9);
+      CHECK(back[width] == 0);
     }
   });
 }
