@@ -1,22 +1,27 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "frontend/features/image.h"
 
 namespace hybrid_slam {
 
-// A smoothed grey image in floating point and its halvings, for sub-pixel alignment. Pixel (x, y)
-// of level k shows the image at (2^k x, 2^k y). Each level carries the same blur in its own pixels,
-// so that interpolation between pixels is accurate. Immutable once built.
+// A smoothed grey image and its halvings, for sub-pixel alignment. Pixel (x, y) of level k shows
+// the image at (2^k x, 2^k y). Each level carries the same blur in its own pixels, so that
+// interpolation between pixels is accurate. Immutable once built.
 class ImagePyramid {
  public:
+  // Pixels are numbers of 16 bits in units of 1 / kUnits grey levels: trackers keep the images of
+  // many keyframes, and what rounding takes away is far below the noise of any image.
+  static constexpr float kUnits = 256;
+
   struct Level {
     int width = 0;
     int height = 0;
-    std::vector<float> pixels;
+    std::vector<std::uint16_t> pixels;
 
-    const float* row(int y) const {
+    const std::uint16_t* row(int y) const {
       return pixels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
     }
   };

@@ -12,9 +12,10 @@ constexpr float kMaxBackError = 1.0;  // [px]
 
 cv::Mat to_bytes(const ImagePyramid& pyramid) {
   const ImagePyramid::Level& image = pyramid.level(0);
-  const cv::Mat view(image.height, image.width, CV_32F, const_cast<float*>(image.pixels.data()));
+  const cv::Mat view(image.height, image.width, CV_16U,
+                     const_cast<std::uint16_t*>(image.pixels.data()));
   cv::Mat bytes;
-  view.convertTo(bytes, CV_8U);
+  view.convertTo(bytes, CV_8U, 1 / ImagePyramid::kUnits);
   return bytes;
 }
 

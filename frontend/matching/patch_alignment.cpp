@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -24,13 +25,15 @@ using Normal = Eigen::Matrix<double, kColumns, kColumns>;
 constexpr double kMinGradientEnergy = 0.5;
 constexpr double kMaxGainRatio = 4;
 constexpr int kMaxHalfSize = 50;
+constexpr float kGreyPerUnit = 1 / ImagePyramid::kUnits;
 
-// Weights of Catmull-Rom interpolation at -1, 0, 1, 2 for t in [0, 1).
-std::array<float, 4> cubic_weights(float t) {
+// Weights of Catmull-Rom interpolation at -1, 0, 1, 2 for t in [0, 1), which sum to `sum`.
+std::array<float, 4> cubic_weights(float t, float sum = 1) {
   const float t2 = t * t;
   const float t3 = t2 * t;
-  return {0.5F * (-t3 + 2 * t2 - t), 0.5F * (3 * t3 - 5 * t2 + 2), 0.5F * (-3 * t3 + 4 * t2 + t),
-          0.5F * (t3 - t2)};
+  const float half = 0.5F * sum;
+  return {half * (-t3 + 2 * t2 - t), half * (3 * t3 - 5 * t2 + 2), half * (-3 * t3 + 4 * t2 + t),
+          half * (t3 - t2)};
 }
 
 // The samples of a square of whole steps around (cx, cy), row by row: all share the same weights,
@@ -41,16 +44,16 @@ void sample_square(const Level& level, double cx, double cy, int half_size, Samp
   const int left = static_cast<int>(x);
   const int top = static_cast<int>(y);
   const std::array<float, 4> wx = cubic_weights(static_cast<float>(x - left));
-  const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top));
+  const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top), kGreyPerUnit);
   const int side = 2 * half_size + 1;
   std::array<float, 2 * (kMaxHalfSize + 1) + 4> column;  // with the derivatives' rim
   samples->resize(side * side);
   float* sample = samples->data();
   for (int v = 0; v < side; ++v) {
-    const float* p0 = level.row(top - 1 + v) + (left - 1);
-    const float* p1 = p0 + level.width;
-    const float* p2 = p1 + level.width;
-    const float* p3 = p2 + level.width;
+    const std::uint16_t* p0 = level.row(top - 1 + v) + (left - 1);
+    const std::uint16_t* p1 = p0 + level.width;
+    const std::uint16_t* p2 = p1 + level.width;
+    const std::uint16_t* p3 = p2 + level.width;
     for (int u = 0; u < side + 3; ++u) {
       column[static_cast<std::size_t>(u)] =
           wy[0] * p0[u] + wy[1] * p1[u] + wy[2] * p2[u] + wy[3] * p3[u];
@@ -69,7 +72,7 @@ void sample_row(const Level& level, const Eigen::Vector2d& centre, const Eigen::
                 const Eigen::Vector2d& step, int half_size, float* samples) {
   constexpr std::size_t kMost = 2 * kMaxHalfSize + 1;
   const auto count = static_cast<std::size_t>(2 * half_size + 1);
-  std::array<const float*, kMost> corner;  // of the 4 x 4 pixels around
+  std::array<const std::uint16_t*, kMost> corner;  // of the 4 x 4 pixels around
   std::array<float, kMost> tx, ty;
   for (std::size_t i = 0; i < count; ++i) {
     const int u = static_cast<int>(i) - half_size;
@@ -83,11 +86,11 @@ void sample_row(const Level& level, const Eigen::Vector2d& centre, const Eigen::
   }
   std::array<std::array<float, 4>, kMost> wx, wy;
   for (std::size_t i = 0; i < count; ++i) wx[i] = cubic_weights(tx[i]);
-  for (std::size_t i = 0; i < count; ++i) wy[i] = cubic_weights(ty[i]);
+  for (std::size_t i = 0; i < count; ++i) wy[i] = cubic_weights(ty[i], kGreyPerUnit);
   for (std::size_t i = 0; i < count; ++i) {
     float along[4];
     for (int j = 0; j < 4; ++j) {
-      const float* p = corner[i] + j * level.width;
+      const std::uint16_t* p = corner[i] + j * level.width;
       along[j] = wx[i][0] * p[0] + wx[i][1] * p[1] + wx[i][2] * p[2] + wx[i][3] * p[3];
     }
     samples[i] =

@@ -189,7 +189,7 @@ TEST_CASE("A pyramid's levels show the same places") {
     double sum = 0, sum_x = 0, sum_y = 0;
     for (int y = 0; y < level.height; ++y) {
       for (int x = 0; x < level.width; ++x) {
-        const double weight = level.row(y)[x] - 20;
+        const double weight = level.row(y)[x] / ImagePyramid::kUnits - 20;
         sum += weight;
         sum_x += weight * x;
         sum_y += weight * y;
