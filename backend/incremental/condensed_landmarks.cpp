@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "backend/incremental/incremental_solver.h"
@@ -98,11 +99,42 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_
   return result;
 }
 
+// Where a member's point lies with its anchor where it is.
+Eigen::Vector3d IncrementalSolver::kept_place(const CondensedTerm::Member& member) const {
+  return inverse(pose_at(member.anchor)) * member.in_anchor.cast<double>();
+}
+
+// Where it fits its observations best with all poses where they are, to second order from where it
+// is kept; nothing if they do not determine it.
+std::optional<Eigen::Vector3d> IncrementalSolver::best_place(const CondensedTerm& term,
+                                                             std::size_t member) const {
+  const Eigen::Vector3d start = kept_place(term.members[member]);
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  for (const std::uint32_t observation : term.observations_of(member)) {
+    Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
+    by_point.row(2).setZero();
+    Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+    if (!reproject(observation, pose(observations_[observation].frame), start, residual.data(),
+                   nullptr, by_point.data())) {
+      continue;
+    }
+    const double root = view_loss(observation).root_weight(residual.squaredNorm());
+    information.noalias() += root * root * by_point.transpose() * by_point;
+    gradient.noalias() += root * root * by_point.transpose() * residual;
+  }
+  Eigen::Matrix3d factor;
+  if (!factor_point(information, factor)) return std::nullopt;
+  factor.triangularView<Eigen::Lower>().solveInPlace(gradient);
+  factor.transpose().triangularView<Eigen::Upper>().solveInPlace(gradient);
+  return start - gradient;
+}
+
 // A member as a term of its own, not linearised.
 LandmarkTerm IncrementalSolver::taken_out(const CondensedTerm& term, std::size_t member) const {
   const CondensedTerm::Member& of = term.members[member];
   LandmarkTerm landmark;
-  landmark.base = inverse(pose_at(of.anchor)) * of.in_anchor.cast<double>();
+  landmark.base = kept_place(of);
   const auto observations = term.observations_of(member);
   landmark.views.reserve(observations.size());
   for (const std::uint32_t observation : observations) {
@@ -137,11 +169,9 @@ LandmarkTerm IncrementalSolver::linearized_landmark(std::uint32_t point) const {
 
 Eigen::Vector3d IncrementalSolver::condensed_point(std::uint32_t point) const {
   const CondensedTerm& term = condensed_[condensed_in_[point]];
-  const CondensedTerm::Member& of = term.members[member_of(point)];
-  if (!term.is_stale) return inverse(pose_at(of.anchor)) * of.in_anchor.cast<double>();
-  const LandmarkTerm landmark = linearized_landmark(point);
-  if (!landmark.solvable) return landmark.base;
-  return landmark.base + displacement(landmark);
+  const std::size_t member = member_of(point);
+  const Eigen::Vector3d kept = kept_place(term.members[member]);
+  return term.is_stale ? best_place(term, member).value_or(kept) : kept;
 }
 
 // The points of its term are minimised over their observations, with the poses where they are.
@@ -150,11 +180,9 @@ void IncrementalSolver::place(std::uint32_t point) {
   CondensedTerm& term = condensed_[condensed_in_[point]];
   if (!term.is_stale) return;
   for (std::size_t i = 0; i < term.members.size(); ++i) {
-    LandmarkTerm landmark = taken_out(term, i);
-    linearize(landmark, landmark.base);
-    if (!landmark.solvable) continue;
+    const auto best = best_place(term, i);
     CondensedTerm::Member& of = term.members[i];
-    of.in_anchor = (pose_at(of.anchor) * (landmark.base + displacement(landmark))).cast<float>();
+    if (best) of.in_anchor = (pose_at(of.anchor) * *best).cast<float>();
   }
   term.placed = deltas_of(term.poses);
   term.is_stale = false;
@@ -169,12 +197,7 @@ double IncrementalSolver::linearize_condensed(std::uint32_t index) {
   for (std::size_t i = 0; i < term.members.size(); ++i) {
     landmarks.push_back(taken_out(term, i));
     LandmarkTerm& landmark = landmarks.back();
-    linearize(landmark, landmark.base);
-    if (landmark.solvable) {  // where it is best with its poses where they are
-      costs.push_back(linearize(landmark, landmark.base + displacement(landmark)));
-    } else {
-      costs.push_back(0);
-    }
+    costs.push_back(linearize(landmark, best_place(term, i).value_or(landmark.base)));
   }
   std::vector<const LandmarkTerm*> members;
   for (const LandmarkTerm& landmark : landmarks) members.push_back(&landmark);

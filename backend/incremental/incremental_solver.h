@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <utility>
 #include <vector>
@@ -231,7 +232,7 @@ class IncrementalSolver final : private TermSource {
     int rows = 0;
   };
   RobustLoss edge_loss(std::uint32_t index) const;
-  RobustLoss view_loss(const LandmarkView& view) const;
+  RobustLoss view_loss(std::uint32_t observation) const;
   Vector6d edge_residual(std::uint32_t index) const;
   // The same of factors of any kind. `point`: that of a landmark's, else null. False if the
   // function fails or gives what is not a number.
@@ -304,6 +305,8 @@ class IncrementalSolver final : private TermSource {
   Eigen::VectorXd deltas_before(const std::vector<std::uint32_t>& poses, const CondensedTerm& term,
                                 const Eigen::VectorXd& since) const;
   std::vector<double> shape_change(const CondensedTerm& term, const Eigen::VectorXd& since) const;
+  Eigen::Vector3d kept_place(const CondensedTerm::Member& member) const;
+  std::optional<Eigen::Vector3d> best_place(const CondensedTerm& term, std::size_t member) const;
   LandmarkTerm taken_out(const CondensedTerm& term, std::size_t member) const;
   std::size_t member_of(std::uint32_t point) const;
   LandmarkTerm linearized_landmark(std::uint32_t point) const;

@@ -10,9 +10,16 @@
 
 namespace hybrid_slam {
 
-void LandmarkTerm::eliminate() {
+bool factor_point(const Eigen::Matrix3d& information, Eigen::Matrix3d& factor) {
   // Beyond this ratio of the factor's diagonal the depth is not determined.
   constexpr double kMinRatio = 1e-6;
+  const Eigen::LLT<Eigen::Matrix3d> llt(information);
+  factor = llt.matrixL();
+  return llt.info() == Eigen::Success &&
+         factor.diagonal().minCoeff() > kMinRatio * factor.diagonal().maxCoeff();
+}
+
+void LandmarkTerm::eliminate() {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   for (const LandmarkView& view : views) {
@@ -25,16 +32,17 @@ void LandmarkTerm::eliminate() {
     information += view.by_point.transpose().lazyProduct(view.by_point);
     gradient += view.by_point.transpose().lazyProduct(view.rows.residual);
   }
-  const Eigen::LLT<Eigen::Matrix3d> llt(information);
-  factor = llt.matrixL();
-  solvable = llt.info() == Eigen::Success &&
-             factor.diagonal().minCoeff() > kMinRatio * factor.diagonal().maxCoeff();
+  solvable = factor_point(information, factor);
   if (!solvable) return;
   half_solved = factor.triangularView<Eigen::Lower>().solve(gradient);
   for (LandmarkView& view : views) {
     if (!view.usable || view.fixed) continue;
+    // Column by column: a solution for all of them together takes longer to set up than to find.
     const Eigen::Matrix<double, 3, 6> cross = view.by_point.transpose() * view.by_pose;
-    view.reduced = factor.triangularView<Eigen::Lower>().solve(cross).transpose();
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      view.reduced.row(i) =
+          factor.triangularView<Eigen::Lower>().solve(cross.col(i)).transpose();
+    }
   }
   for (FactorView& view : factors) {
     if (!view.usable) continue;

@@ -50,6 +50,9 @@ struct LandmarkChange {
   std::vector<float> evaluated_at;
 };
 
+// The Cholesky factor of a point's information. False if that does not determine the point.
+bool factor_point(const Eigen::Matrix3d& information, Eigen::Matrix3d& factor);
+
 // All observations of a landmark, with the landmark eliminated (Schur complement): what is left is
 // a term on the poses that see it,
 //   H(i, j) = [i = j] by_pose_i^T by_pose_i - reduced_i reduced_j^T.

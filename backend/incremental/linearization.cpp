@@ -41,8 +41,8 @@ RobustLoss IncrementalSolver::edge_loss(std::uint32_t index) const {
   return {edges_[index].loop ? options_.loop_loss : Loss::kNone, options_.chi2_loop};
 }
 
-RobustLoss IncrementalSolver::view_loss(const LandmarkView& view) const {
-  const bool stereo = rows_of_observation(view.observation) == 3;
+RobustLoss IncrementalSolver::view_loss(std::uint32_t observation) const {
+  const bool stereo = rows_of_observation(observation) == 3;
   return {options_.loss, stereo ? options_.chi2_stereo : options_.chi2_mono};
 }
 
@@ -101,7 +101,7 @@ bool IncrementalSolver::linearize_view(const Eigen::Vector3d& point, LandmarkVie
                  by_point.data())) {
     return false;
   }
-  const RobustLoss loss = view_loss(view);
+  const RobustLoss loss = view_loss(view.observation);
   const double squared = view.residual.squaredNorm();
   cost += loss.cost(squared);
   const double weight = loss.root_weight(squared);
@@ -211,7 +211,7 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
       result.cost += kFarOff;
       continue;
     }
-    const RobustLoss loss = view_loss(view);
+    const RobustLoss loss = view_loss(view.observation);
     const double squared = residual.squaredNorm();
     result.cost += loss.cost(squared);
     residual *= loss.root_weight(squared);
