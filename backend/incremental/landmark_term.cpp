@@ -40,8 +40,7 @@ void LandmarkTerm::eliminate() {
     // Column by column: a solution for all of them together takes longer to set up than to find.
     const Eigen::Matrix<double, 3, 6> cross = view.by_point.transpose() * view.by_pose;
     for (Eigen::Index i = 0; i < 6; ++i) {
-      view.reduced.row(i) =
-          factor.triangularView<Eigen::Lower>().solve(cross.col(i)).transpose();
+      view.reduced.row(i) = factor.triangularView<Eigen::Lower>().solve(cross.col(i)).transpose();
     }
   }
   for (FactorView& view : factors) {
