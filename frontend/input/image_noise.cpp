@@ -1,5 +1,6 @@
 #include "frontend/input/image_noise.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -20,26 +21,21 @@ constexpr double kMedianOfNormal = 0.6745;
 // The kernel [1 -2 1; -2 4 -2; 1 -2 1] turns white noise into six times as much.
 constexpr double kKernelGain = 6;
 
-int response(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below,
-             int x) {
-  const auto bend = [x](const std::uint8_t* row) { return row[x - 1] - 2 * row[x] + row[x + 1]; };
-  return bend(above) - 2 * bend(here) + bend(below);
+// The kernel's response, its nine pixels so far apart.
+int response(const std::array<const std::uint8_t*, 3>& rows, int x, int spacing) {
+  const auto bend = [=](const std::uint8_t* row) {
+    return row[x - spacing] - 2 * row[x] + row[x + spacing];
+  };
+  return bend(rows[0]) - 2 * bend(rows[1]) + bend(rows[2]);
 }
 
-// Of white noise, 1 / (2 sqrt(pi) s) is left behind a Gaussian of standard deviation s.
-double smoothing_of(const GrayImage& image) {
-  return image_noise(image) / (2 * std::sqrt(std::numbers::pi) * kQuiet);
-}
-
-}  // namespace
-
-double image_noise(const GrayImage& image) {
+double noise_at(const GrayImage& image, int spacing) {
   std::array<int, 16 * 255 + 1> histogram{};
   int total = 0;
-  for (int y = 1; y < image.height - 1; y += kRowStep) {
-    for (int x = 1; x < image.width - 1; ++x, ++total) {
-      const int value = response(image.row(y - 1), image.row(y), image.row(y + 1), x);
-      ++histogram[static_cast<std::size_t>(std::abs(value))];
+  for (int y = spacing; y < image.height - spacing; y += kRowStep) {
+    const std::array rows{image.row(y - spacing), image.row(y), image.row(y + spacing)};
+    for (int x = spacing; x < image.width - spacing; ++x, ++total) {
+      ++histogram[static_cast<std::size_t>(std::abs(response(rows, x, spacing)))];
     }
   }
   int below = 0;
@@ -50,11 +46,22 @@ double image_noise(const GrayImage& image) {
   return 0;
 }
 
-bool is_noisy(const GrayImage& image) { return smoothing_of(image) >= kMinSmoothing; }
+// Of white noise, 1 / (2 sqrt(pi) s) is left behind a Gaussian of standard deviation s.
+double smoothing_of(double noise) { return noise / (2 * std::sqrt(std::numbers::pi) * kQuiet); }
+
+}  // namespace
+
+double image_noise(const GrayImage& image) { return noise_at(image, 1); }
+
+double coarse_noise(const GrayImage& image) {
+  return std::max(noise_at(image, 1), noise_at(image, 2));
+}
+
+bool is_noisy(const GrayImage& image) { return smoothing_of(image_noise(image)) >= kMinSmoothing; }
 
 bool suppress_noise(GrayImage& image) {
-  const double smoothing = smoothing_of(image);
-  if (smoothing < kMinSmoothing) return false;
+  if (!is_noisy(image)) return false;
+  const double smoothing = smoothing_of(coarse_noise(image));
   cv::Mat pixels(image.height, image.width, CV_8UC1, image.pixels.data());
   cv::GaussianBlur(pixels.clone(), pixels, cv::Size(), smoothing);
   return true;
