@@ -184,7 +184,7 @@ TEST_CASE("A keyframe that was tracked before the map moved comes in where the m
   StageTimes times;
   BundleResult moved;
   moved.cam_from_world = {{reference, job.reference_from_world * by}};
-  mapping.take_in_full(std::move(moved), mapping.closings(), times, [] {});
+  mapping.take_in_full(std::move(moved), mapping.closings(), times);
   std::shared_ptr<const MapSnapshot> placed;
   const KeyframeId id = mapping.process(job, times, [&] {
     if (!placed) placed = mapping.snapshot();
