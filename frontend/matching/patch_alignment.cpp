@@ -16,20 +16,8 @@ using Samples = Eigen::VectorXf;
 
 // What the target's grey values are made of, each without its mean over the patch: the derivatives
 // by a shift of the patch, per pixel of the level; the values themselves (gain); the values times x
-// and times y (a gain that changes across the patch); x and y (a veil that does); the derivative by
-// a shift along x, times x and times y (a disparity that changes across the patch).
-enum Column {
-  kShiftX,
-  kShiftY,
-  kGain,
-  kGainX,
-  kGainY,
-  kVeilX,
-  kVeilY,
-  kDisparityX,
-  kDisparityY,
-  kColumns
-};
+// and times y (a gain that changes across the patch); x and y (a veil that does).
+enum Column { kShiftX, kShiftY, kGain, kGainX, kGainY, kVeilX, kVeilY, kColumns };
 using Columns = Eigen::Matrix<float, Eigen::Dynamic, kColumns>;
 using Normal = Eigen::Matrix<double, kColumns, kColumns>;
 
@@ -162,12 +150,7 @@ bool has_place(const Normal& inverse, Eigen::Index samples, bool horizontal_only
 // Three numbers are sought, each the scalar product of the target with a patch of weights.
 void find_weights(const Columns& columns, Normal normal, bool horizontal_only,
                   ReferencePatch* patch) {
-  if (horizontal_only) {
-    hold(kShiftY, &normal);
-  } else {
-    // How the patch is warped between views comes from the caller.
-    for (const auto k : {kDisparityX, kDisparityY}) hold(k, &normal);
-  }
+  if (horizontal_only) hold(kShiftY, &normal);
   Normal inverse = normal.inverse();
   patch->usable = inverse.allFinite() && has_place(inverse, columns.rows(), horizontal_only);
   if (!patch->usable) return;
@@ -207,12 +190,7 @@ Columns columns_of(const Samples& samples, int half) {
   const auto gain = columns.col(kGain).array();
   columns.col(kGainX) = gain * columns.col(kVeilX).array();
   columns.col(kGainY) = gain * columns.col(kVeilY).array();
-  const auto shift = columns.col(kShiftX).array();
-  columns.col(kDisparityX) = shift * columns.col(kVeilX).array();
-  columns.col(kDisparityY) = shift * columns.col(kVeilY).array();
-  for (const auto k : {kShiftX, kShiftY, kGainX, kGainY, kDisparityX, kDisparityY}) {
-    remove_mean(columns.col(k));
-  }
+  for (const auto k : {kShiftX, kShiftY, kGainX, kGainY}) remove_mean(columns.col(k));
   return columns;
 }
 

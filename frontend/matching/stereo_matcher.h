@@ -19,8 +19,7 @@ struct StereoMatcherOptions {
   double max_descriptor_distance = 0.9;  // L2 between unit descriptors
   double ratio = 0.9;                    // best against second best along the row
   bool refine = true;  // sub-pixel disparity by aligning patches of the two images
-  // Eleven samples wide: the ground bends within wider ones.
-  AlignmentOptions alignment{.half_size = 5, .horizontal_only = true};
+  AlignmentOptions alignment{.horizontal_only = true};
 
   // Empty if the values can be used, else what is wrong.
   std::string validate() const;
