@@ -26,8 +26,7 @@ bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
                                                : std::numeric_limits<double>::infinity();
   std::vector<KeyframeId> left_out = erased;
   left_out.push_back(keyframe.id);
-  int counted = 0;
-  int redundant = 0;
+  std::vector<LandmarkInView> in_view;
   for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
     const Landmark* landmark =
         keyframe.landmarks[i].valid() ? map.find(keyframe.landmarks[i]) : nullptr;
@@ -35,13 +34,10 @@ bool is_redundant(const MapSnapshot& map, const Keyframe& keyframe,
         (keyframe.cam_from_world * landmark->point_in_world).norm() > max_depth) {
       continue;
     }
-    ++counted;
     const Keypoint& keypoint = keyframe.observations->features.keypoints[i];
-    const double scale = normalized_scale(map.camera(keyframe), keypoint);
-    const int observers = options.redundancy.observers;
-    redundant += is_well_seen(map, *landmark, scale, observers, left_out) ? 1 : 0;
+    in_view.push_back({landmark, normalized_scale(map.camera(keyframe), keypoint)});
   }
-  return counted > 0 && redundant > options.redundancy.share * counted;
+  return is_redundant(map, in_view, 0, options.redundancy, left_out);
 }
 
 // Of its camera: tracking refers to it, and the odometry of the next one will begin there.

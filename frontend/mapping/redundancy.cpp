@@ -36,4 +36,17 @@ bool is_well_seen(const MapSnapshot& map, const Landmark& landmark, double scale
   return false;
 }
 
+bool is_redundant(const MapSnapshot& map, std::span<const LandmarkInView> landmarks, int others,
+                  const RedundancyOptions& options, const std::vector<KeyframeId>& left_out) {
+  const auto total = static_cast<int>(landmarks.size());
+  const double enough = options.share * (total + others);
+  int well_seen = 0;
+  for (int i = 0; i < total && well_seen + (total - i) > enough; ++i) {
+    const auto& [landmark, scale] = landmarks[static_cast<std::size_t>(i)];
+    well_seen += is_well_seen(map, *landmark, scale, options.observers, left_out) ? 1 : 0;
+    if (well_seen > enough) return true;
+  }
+  return false;
+}
+
 }  // namespace hybrid_slam

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,5 +25,16 @@ double normalized_scale(const Camera& camera, const Keypoint& keypoint);
 // a finer one.
 bool is_well_seen(const MapSnapshot& map, const Landmark& landmark, double scale, int observers,
                   const std::vector<KeyframeId>& left_out = {});
+
+// A landmark in view, and the normalized scale at which the view shows it.
+struct LandmarkInView {
+  const Landmark* landmark = nullptr;
+  double scale = 0;
+};
+
+// Whether more than the share of what is in view is well seen: of these landmarks, and of so many
+// `others` that nobody sees. Looks no further than it has to.
+bool is_redundant(const MapSnapshot& map, std::span<const LandmarkInView> landmarks, int others,
+                  const RedundancyOptions& options, const std::vector<KeyframeId>& left_out = {});
 
 }  // namespace hybrid_slam

@@ -86,19 +86,16 @@ MapMatcher::Search MapMatcher::search_of(const MapSnapshot& map, const Frame& fr
 
 bool MapMatcher::is_redundant(const MapSnapshot& map, const Frame& frame, double max_distance,
                               int new_points) const {
-  int counted = new_points;
-  int well_seen = 0;
+  std::vector<LandmarkInView> in_view;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     const Landmark* landmark = frame.landmarks[i].valid() ? map.find(frame.landmarks[i]) : nullptr;
     if (landmark == nullptr ||
         (frame.cam_from_world * landmark->point_in_world).norm() > max_distance) {
       continue;
     }
-    ++counted;
-    const double scale = normalized_scale(camera_, frame.features.left.keypoints[i]);
-    well_seen += is_well_seen(map, *landmark, scale, options_.redundancy.observers) ? 1 : 0;
+    in_view.push_back({landmark, normalized_scale(camera_, frame.features.left.keypoints[i])});
   }
-  return well_seen > options_.redundancy.share * counted;
+  return hybrid_slam::is_redundant(map, in_view, new_points, options_.redundancy);
 }
 
 void MapMatcher::keep_agreeing(const MapSnapshot& map, Frame& frame) const {

@@ -233,5 +233,27 @@ TEST_CASE("CullingOptions out of range are refused") {
   refused([](auto& options, double value) { options.close_baselines = value; });
 }
 
+TEST_CASE("A view is redundant when more than the share of what is in it is well seen") {
+  ProbationMap made;
+  made.add({}, all_points());
+  made.add({0, 1, 2, 3, 4, 5, 6}, {});
+  made.add({0, 1, 2, 3, 4, 5, 6}, {});
+  const MapSnapshot& map = made.map.view();
+  std::vector<LandmarkInView> in_view;
+  for (const LandmarkId id : map.landmark_ids()) {
+    in_view.push_back({&map.at(id), 1});  // all keyframes see it at a finer scale
+  }
+  for (int others = 0; others < 4; ++others) {
+    for (const double share : {0.1, 0.5, 0.52, 0.6, 0.69, 0.7, 0.71, 1.0}) {
+      CAPTURE(others, share);
+      const bool expected = 7 > share * (10 + others);  // seven have three observers
+      CHECK(is_redundant(map, in_view, others, {share, 3}) == expected);
+      std::vector<LandmarkInView> reversed(in_view.rbegin(), in_view.rend());
+      CHECK(is_redundant(map, reversed, others, {share, 3}) == expected);
+    }
+  }
+  CHECK_FALSE(is_redundant(map, {}, 0, {0.9, 3}));
+}
+
 }  // namespace
 }  // namespace hybrid_slam
