@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "backend/incremental/incremental_solver.h"
+#include "backend/map/prefetch.h"
 
 // The condensed landmarks of an IncrementalSolver: evaluated, made anew, and taken apart again.
 
@@ -111,7 +112,9 @@ std::optional<Eigen::Vector3d> IncrementalSolver::best_place(const CondensedTerm
   const Eigen::Vector3d start = kept_place(term.members[member]);
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  for (const std::uint32_t observation : term.observations_of(member)) {
+  const auto observations = term.observations_of(member);
+  for (const std::uint32_t observation : observations) prefetch(&observations_[observation]);
+  for (const std::uint32_t observation : observations) {
     Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
     by_point.row(2).setZero();
     Eigen::Vector3d residual = Eigen::Vector3d::Zero();
@@ -186,6 +189,23 @@ void IncrementalSolver::place(std::uint32_t point) {
   }
   term.placed = deltas_of(term.poses);
   term.is_stale = false;
+}
+
+std::vector<Eigen::Vector3d> IncrementalSolver::place(std::span<const std::uint32_t> points) {
+  std::vector<Eigen::Vector3d> estimates;
+  estimates.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i + 2 * kPrefetchAhead < points.size()) {
+      prefetch(landmarks_[points[i + 2 * kPrefetchAhead]].get());
+    }
+    if (i + kPrefetchAhead < points.size()) {
+      const LandmarkTerm* const next = landmarks_[points[i + kPrefetchAhead]].get();
+      if (next != nullptr) prefetch_all(next->views);
+    }
+    place(points[i]);
+    estimates.push_back(point(points[i]));
+  }
+  return estimates;
 }
 
 // Makes a condensed term anew from its observations.

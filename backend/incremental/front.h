@@ -101,6 +101,10 @@ class TermSource {
   virtual std::span<const std::uint32_t> terms_of(std::uint32_t variable) const = 0;
   virtual std::span<const std::uint32_t> poses_of(std::uint32_t term) const = 0;
   virtual void assemble(std::uint32_t term, Front& front) const = 0;
+  // Of these terms, which are gone through in their order, the one at `at` is next: what comes
+  // after it may be brought into the cache, what poses_of() or what assemble() reads.
+  virtual void fetch_poses(std::span<const std::uint32_t> /*terms*/, std::size_t /*at*/) const {}
+  virtual void fetch(std::span<const std::uint32_t> /*terms*/, std::size_t /*at*/) const {}
   // Whether any term has this variable.
   virtual bool has_terms(std::uint32_t variable) const { return !terms_of(variable).empty(); }
 };

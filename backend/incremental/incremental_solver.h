@@ -106,6 +106,8 @@ class IncrementalSolver final : private TermSource {
   // Changes no estimate: makes point() fast for this one and those condensed with it, as long as
   // the poses that see them keep their shape.
   void place(std::uint32_t point);
+  // The same of these, and where they are.
+  std::vector<Eigen::Vector3d> place(std::span<const std::uint32_t> points);
   Eigen::VectorXd block(std::uint32_t index) const;
   std::size_t pose_count() const { return poses_.size(); }
   std::size_t condensed_count() const { return condensed_count_; }  // points
@@ -191,6 +193,9 @@ class IncrementalSolver final : private TermSource {
   bool has_terms(std::uint32_t variable) const override;
   std::span<const std::uint32_t> poses_of(std::uint32_t term) const override;
   void assemble(std::uint32_t term, Front& front) const override;
+  const LandmarkTerm* landmark_at(std::span<const std::uint32_t> terms, std::size_t at) const;
+  void fetch_poses(std::span<const std::uint32_t> terms, std::size_t at) const override;
+  void fetch(std::span<const std::uint32_t> terms, std::size_t at) const override;
 
   std::uint32_t free_pose();
   std::uint32_t new_pose(bool fixed);
@@ -224,6 +229,7 @@ class IncrementalSolver final : private TermSource {
                  const Eigen::Vector3d& point, double* residual, double* d_pose = nullptr,
                  double* d_point = nullptr) const;
   int rows_of_observation(std::uint32_t observation) const;
+  void fetch_measurements(std::span<const std::uint32_t> terms, std::size_t at) const;
   // A term's residual at the present estimate.
   struct Evaluation {
     double squared_norm = 0;      // of what the linearisation predicts: weighted
@@ -233,6 +239,7 @@ class IncrementalSolver final : private TermSource {
   };
   RobustLoss edge_loss(std::uint32_t index) const;
   RobustLoss view_loss(std::uint32_t observation) const;
+  RobustLoss loss_of_rows(int rows) const;  // of an observation
   Vector6d edge_residual(std::uint32_t index) const;
   // The same of factors of any kind. `point`: that of a landmark's, else null. False if the
   // function fails or gives what is not a number.

@@ -42,8 +42,11 @@ RobustLoss IncrementalSolver::edge_loss(std::uint32_t index) const {
 }
 
 RobustLoss IncrementalSolver::view_loss(std::uint32_t observation) const {
-  const bool stereo = rows_of_observation(observation) == 3;
-  return {options_.loss, stereo ? options_.chi2_stereo : options_.chi2_mono};
+  return loss_of_rows(rows_of_observation(observation));
+}
+
+RobustLoss IncrementalSolver::loss_of_rows(int rows) const {
+  return {options_.loss, rows == 3 ? options_.chi2_stereo : options_.chi2_mono};
 }
 
 double IncrementalSolver::linearize_edge(std::uint32_t index) {
@@ -205,13 +208,14 @@ IncrementalSolver::Evaluation IncrementalSolver::evaluate_landmark(std::uint32_t
     if (!view.usable) continue;
     const Rigid3d cam_from_world = pose_at(view.pose);
     Eigen::Vector3d residual = Eigen::Vector3d::Zero();
-    result.rows += rows_of_observation(view.observation);
+    const int rows = rows_of_observation(view.observation);
+    result.rows += rows;
     if (!reproject(view.observation, cam_from_world, at, residual.data())) {
       result.squared_mismatch += kFarOff;
       result.cost += kFarOff;
       continue;
     }
-    const RobustLoss loss = view_loss(view.observation);
+    const RobustLoss loss = loss_of_rows(rows);
     const double squared = residual.squaredNorm();
     result.cost += loss.cost(squared);
     residual *= loss.root_weight(squared);

@@ -135,16 +135,20 @@ std::vector<std::uint32_t> PoseTree::terms_inside(const std::vector<std::uint32_
   for (const std::uint32_t pose : poses) {
     for (const std::uint32_t term : terms.terms_of(pose)) {
       if (term >= looked_at_.size()) looked_at_.resize(term + 1, 0);
-      if (looked_at_[term] == look_) continue;
-      looked_at_[term] = look_;
-      const auto members = terms.poses_of(term);
-      if (std::all_of(members.begin(), members.end(),
-                      [&](std::uint32_t member) { return local_[member] != kOutside; })) {
-        inside.push_back(term);
-      }
+      if (std::exchange(looked_at_[term], look_) != look_) inside.push_back(term);
     }
   }
   std::sort(inside.begin(), inside.end());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    terms.fetch_poses(inside, i);
+    const auto members = terms.poses_of(inside[i]);
+    if (std::all_of(members.begin(), members.end(),
+                    [&](std::uint32_t member) { return local_[member] != kOutside; })) {
+      inside[kept++] = inside[i];
+    }
+  }
+  inside.resize(kept);
   return inside;
 }
 

@@ -198,7 +198,10 @@ Front PoseTree::assemble(const Clique& clique, const std::vector<std::uint32_t>&
     }
   }
   Front front(std::move(offsets), slot_of_);
-  for (const std::uint32_t term : own) terms.assemble(term, front);
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    terms.fetch(own, i);
+    terms.assemble(own[i], front);
+  }
   for (const std::int32_t child : clique.children) add_contribution(at(child), front);
   damp(clique, front);
   return front;

@@ -9,6 +9,7 @@
 #include "backend/map/map_transaction.h"
 #include "backend/map/marked_landmarks.h"
 #include "backend/map/odometry.h"
+#include "backend/map/prefetch.h"
 #include "backend/map/spanning_tree.h"
 
 namespace hybrid_slam {
@@ -65,6 +66,16 @@ void count(PersistentTable<Landmark>& landmarks, const std::vector<LandmarkCount
     landmark.visible += one.visible;
     landmark.found += one.found;
   }
+}
+
+// Brings what is read of those after the one at `at` into the cache.
+void fetch(const PersistentTable<Landmark>& landmarks, const std::vector<LandmarkId>& ids,
+           std::size_t at) {
+  const auto find = [&](std::size_t i) {
+    return i < ids.size() ? landmarks.find(ids[i].value) : nullptr;
+  };
+  prefetch(find(at + 2 * kPrefetchAhead));
+  if (const Landmark* next = find(at + kPrefetchAhead)) prefetch_all(next->observations);
 }
 
 }  // namespace
@@ -167,15 +178,18 @@ void Map::move(const std::vector<std::pair<KeyframeId, Rigid3d>>& cam_from_world
   }
   std::stable_sort(places.begin(), places.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<LandmarkId> ids;
+  changed.for_each([&](LandmarkId id) { ids.push_back(id); });
   CameraCenters centers(tables);
   auto place = places.begin();
-  changed.for_each([&](LandmarkId id) {
-    Landmark* const landmark = tables.landmarks.edit_if(id.value);
-    for (; place != places.end() && place->first == id; ++place) {
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    fetch(tables.landmarks, ids, i);
+    Landmark* const landmark = tables.landmarks.edit_if(ids[i].value);
+    for (; place != places.end() && place->first == ids[i]; ++place) {
       if (landmark != nullptr) landmark->point_in_world = *place->second;
     }
     if (landmark != nullptr) update_geometry(tables, centers, *landmark);
-  });
+  }
 }
 
 void Map::set_camera(CameraId id, const Camera& camera) {

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "backend/map/prefetch.h"
 #include "frontend/matching/descriptor_distance.h"
 
 namespace hybrid_slam {
@@ -110,8 +111,9 @@ std::vector<LandmarkPrediction> predict_landmarks(const MapSnapshot& map, const 
   predictions.reserve(ids.size());
   std::visit(
       [&](const auto& calibrated) {
-        for (const LandmarkId id : ids) {
-          const Landmark* landmark = map.find(id);
+        for (std::size_t i = 0; i < ids.size(); ++i) {
+          if (i + kPrefetchAhead < ids.size()) prefetch(map.find(ids[i + kPrefetchAhead]));
+          const Landmark* landmark = map.find(ids[i]);
           if (landmark == nullptr) {
             continue;
           }
