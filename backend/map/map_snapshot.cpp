@@ -45,6 +45,7 @@ std::vector<KeyframeId> MapSnapshot::keyframe_ids() const {
 }
 
 KeyframeId MapSnapshot::next_keyframe_id() const { return KeyframeId(tables_.next_keyframe); }
+LandmarkId MapSnapshot::next_landmark_id() const { return LandmarkId(tables_.next_landmark); }
 
 std::vector<KeyframeId> MapSnapshot::keyframe_ids_from(KeyframeId first) const {
   std::vector<KeyframeId> ids;

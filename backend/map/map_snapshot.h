@@ -36,6 +36,7 @@ class MapSnapshot {
   // The id that the next keyframe of the map gets: all that are in it, or ever were, have lower
   // ones.
   KeyframeId next_keyframe_id() const;
+  LandmarkId next_landmark_id() const;
 
   // Keyframes of the id `first` or a higher one, ascending. Costs next_keyframe_id() - first.
   std::vector<KeyframeId> keyframe_ids_from(KeyframeId first) const;

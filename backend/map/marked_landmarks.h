@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "backend/map/ids.h"
@@ -15,9 +16,12 @@ class MarkedLandmarks {
   // Of a map whose next landmark gets the id `ids`.
   explicit MarkedLandmarks(std::uint32_t ids) : words_(ids / kBits + 1) {}
 
-  // Nothing for one that there never was.
-  void mark(LandmarkId id) {
-    if (id.value / kBits < words_.size()) words_[id.value / kBits] |= bit(id.value % kBits);
+  // Whether it was not marked before. Nothing for one that there never was.
+  bool mark(LandmarkId id) {
+    if (id.value / kBits >= words_.size()) return false;
+    std::uint64_t& word = words_[id.value / kBits];
+    const std::uint64_t before = std::exchange(word, word | bit(id.value % kBits));
+    return word != before;
   }
 
   // Ascending.

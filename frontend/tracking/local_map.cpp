@@ -1,9 +1,12 @@
 #include "frontend/tracking/local_map.h"
 
 #include <algorithm>
-#include <map>
+#include <cstdint>
 #include <unordered_set>
 #include <utility>
+
+#include "backend/map/marked_landmarks.h"
+#include "backend/map/prefetch.h"
 
 namespace hybrid_slam {
 namespace {
@@ -11,19 +14,23 @@ namespace {
 // Keyframes by the number of `tracked` landmarks they see, most first (ties: lower id).
 std::vector<std::pair<int, KeyframeId>> count_observers(const MapSnapshot& map,
                                                         const std::vector<LandmarkId>& tracked) {
-  std::map<KeyframeId, int> votes;
-  for (const LandmarkId id : tracked) {
-    const Landmark* landmark = id.valid() ? map.find(id) : nullptr;
+  std::vector<int> votes(map.next_keyframe_id().value, 0);
+  const auto find = [&](std::size_t i) {
+    return i < tracked.size() && tracked[i].valid() ? map.find(tracked[i]) : nullptr;
+  };
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    if (const Landmark* next = find(i + 2 * kPrefetchAhead)) prefetch(&next->observations);
+    if (const Landmark* next = find(i + kPrefetchAhead)) prefetch_all(next->observations);
+    const Landmark* landmark = find(i);
     if (landmark != nullptr) {
       for (const Observation& observation : landmark->observations) {
-        ++votes[observation.keyframe];
+        ++votes[observation.keyframe.value];
       }
     }
   }
   std::vector<std::pair<int, KeyframeId>> ranked;
-  ranked.reserve(votes.size());
-  for (const auto& [id, count] : votes) {
-    ranked.emplace_back(count, id);
+  for (std::uint32_t id = 0; id < votes.size(); ++id) {
+    if (votes[id] > 0) ranked.emplace_back(votes[id], KeyframeId(id));
   }
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -75,12 +82,10 @@ LocalMap make_local_map(const MapSnapshot& map, const std::vector<LandmarkId>& t
   }
   local.reference = local.keyframes.front();
   add_neighbours(map, options, local);
-  std::unordered_set<LandmarkId> seen;
+  MarkedLandmarks seen(map.next_landmark_id().value);
   for (const KeyframeId keyframe : local.keyframes) {
     for (const LandmarkId id : map.at(keyframe).landmarks) {
-      if (id.valid() && seen.insert(id).second) {
-        local.landmarks.push_back(id);
-      }
+      if (seen.mark(id)) local.landmarks.push_back(id);
     }
   }
   return local;
