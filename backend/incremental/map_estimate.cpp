@@ -76,9 +76,9 @@ void MapSmoother::set_outliers_aside(const MapSnapshot& map, KeyframeId newest,
   const IncrementalOptions& options = options_.solver;
   doubted_.clear();
   for (const LandmarkId id : map.at(newest).landmarks) {
-    const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
-    if (found == landmarks_.end()) continue;
-    std::erase_if(found->second.views, [&](const View& view) {
+    KnownLandmark* const landmark = landmarks_.find(id.value);
+    if (landmark == nullptr) continue;
+    std::erase_if(landmark->views, [&](const View& view) {
       if (view.in_solver == kNone) return false;
       const bool stereo = map.at(view.seen.keyframe).observations->has_right(view.seen.keypoint);
       if (solver_->chi2(view.in_solver) <= (stereo ? options.chi2_stereo : options.chi2_mono)) {
@@ -100,12 +100,14 @@ void MapSmoother::write(const MapSnapshot& map, const std::vector<KeyframeId>& k
     told_[pose] = solver_->pose(pose);
     result.cam_from_world.emplace_back(id, told_[pose]);
   }
-  for (const LandmarkId id : seen_by(map, keyframes, std::move(seen))) {
-    const auto found = landmarks_.find(id);
-    if (found == landmarks_.end()) continue;
-    solver_->place(found->second.point);
-    const Eigen::Vector3d estimate = solver_->point(found->second.point);
-    if (estimate.allFinite()) result.point_in_world.emplace_back(id, estimate);
+  std::vector<LandmarkId> ids = seen_by(map, keyframes, std::move(seen));
+  std::erase_if(ids, [this](LandmarkId id) { return landmarks_.find(id.value) == nullptr; });
+  std::vector<std::uint32_t> points;
+  points.reserve(ids.size());
+  for (const LandmarkId id : ids) points.push_back(landmarks_.find(id.value)->point);
+  const std::vector<Eigen::Vector3d> estimates = solver_->place(points);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (estimates[i].allFinite()) result.point_in_world.emplace_back(ids[i], estimates[i]);
   }
 }
 

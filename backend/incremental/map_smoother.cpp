@@ -7,6 +7,7 @@
 
 #include "backend/incremental/incremental_solver.h"
 #include "backend/map/dropped_features.h"
+#include "backend/map/prefetch.h"
 #include "backend/problem/odometry_constraints.h"
 
 namespace hybrid_slam {
@@ -47,8 +48,9 @@ BundleResult MapSmoother::update(std::shared_ptr<const MapSnapshot> map,
   take_in_loops(*map);
   const std::vector<LandmarkId> changed =
       known_map_ != nullptr ? map->changed_landmarks(*known_map_) : map->landmark_ids();
-  for (const LandmarkId id : changed) {
-    if (known_map_ == nullptr || is_news(*map, id)) take_in_landmark(*map, id);
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    if (known_map_ != nullptr) fetch(*map, changed, i);
+    if (known_map_ == nullptr || is_news(*map, changed[i])) take_in_landmark(*map, changed[i]);
   }
   take_in_odometry(*map);
   const UpdateSummary updated = solver_->update(stop);
@@ -76,9 +78,9 @@ void MapSmoother::renumber(KeyframeId keyframe, std::span<const std::uint32_t> k
   const Keyframe* known = known_map_ != nullptr ? known_map_->find(keyframe) : nullptr;
   if (known == nullptr) return;
   for (const LandmarkId id : known->landmarks) {
-    const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
-    if (found == landmarks_.end()) continue;
-    for (View& view : found->second.views) {
+    KnownLandmark* const landmark = landmarks_.find(id.value);
+    if (landmark == nullptr) continue;
+    for (View& view : landmark->views) {
       if (view.seen.keyframe == keyframe) {
         view.seen.keypoint = new_keypoint(kept, view.seen.keypoint).value_or(kNone);
       }
@@ -189,6 +191,21 @@ void MapSmoother::take_in_odometry(const MapSnapshot& map, KeyframeId id) {
                                   constraint->information.topLeftCorner<6, 6>(), false});
 }
 
+// Brings into the cache what is_news() reads of those after the one at `at`.
+void MapSmoother::fetch(const MapSnapshot& map, std::span<const LandmarkId> ids,
+                        std::size_t at) const {
+  for (const MapSnapshot* of : {known_map_.get(), &map}) {
+    if (at + 2 * kPrefetchAhead < ids.size()) {
+      const Landmark* const landmark = of->find(ids[at + 2 * kPrefetchAhead]);
+      if (landmark != nullptr) prefetch(&landmark->observations);
+    }
+    if (at + kPrefetchAhead < ids.size()) {
+      const Landmark* const landmark = of->find(ids[at + kPrefetchAhead]);
+      if (landmark != nullptr) prefetch_all(landmark->observations);
+    }
+  }
+}
+
 // Not where a landmark has but moved, as most do that changed, unless views of it were set aside:
 // the map may have taken them in again.
 bool MapSmoother::is_news(const MapSnapshot& map, LandmarkId id) const {
@@ -202,14 +219,13 @@ bool MapSmoother::is_news(const MapSnapshot& map, LandmarkId id) const {
 void MapSmoother::take_in_landmark(const MapSnapshot& map, LandmarkId id) {
   const Landmark* landmark = map.find(id);
   if (landmark == nullptr) {
-    const auto gone = landmarks_.find(id);
-    if (gone == landmarks_.end()) return;
-    solver_->remove_point(gone->second.point);
-    landmarks_.erase(gone);
+    const KnownLandmark* const gone = landmarks_.find(id.value);
+    if (gone == nullptr) return;
+    solver_->remove_point(gone->point);
+    landmarks_.erase(id.value);
     return;
   }
-  const auto [place, is_new] = landmarks_.try_emplace(id);
-  KnownLandmark& known = place->second;
+  const auto [known, is_new] = landmarks_.try_emplace(id.value);
   if (is_new) known.point = solver_->add_point(landmark->point_in_world);
   const std::vector<Observation>& wanted = landmark->observations;
   std::erase_if(known.views, [&](const View& view) {
@@ -253,9 +269,9 @@ void MapSmoother::forget_marginalized(const MapSnapshot& map,
     const Keyframe* keyframe = map.find(keyframe_of_[pose]);
     if (keyframe == nullptr) continue;
     for (const LandmarkId id : keyframe->landmarks) {
-      const auto found = id.valid() ? landmarks_.find(id) : landmarks_.end();
-      if (found == landmarks_.end()) continue;
-      for (View& view : found->second.views) view.in_solver = kNone;
+      KnownLandmark* const landmark = landmarks_.find(id.value);
+      if (landmark == nullptr) continue;
+      for (View& view : landmark->views) view.in_solver = kNone;
     }
   }
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "backend/incremental/incremental_options.h"
+#include "backend/incremental/paged_table.h"
 #include "backend/map/map_snapshot.h"
 #include "backend/problem/problem_config.h"
 
@@ -103,6 +104,7 @@ class MapSmoother {
   static double distance(const Rigid3d& a, const Rigid3d& b);
   bool stayed(const Keyframe& keyframe) const;
   void take_in_loops(const MapSnapshot& map);
+  void fetch(const MapSnapshot& map, std::span<const LandmarkId> ids, std::size_t at) const;
   bool is_news(const MapSnapshot& map, LandmarkId id) const;
   void take_in_landmark(const MapSnapshot& map, LandmarkId id);
   void take_in_odometry(const MapSnapshot& map);
@@ -127,7 +129,7 @@ class MapSmoother {
   std::vector<KeyframeId> gone_;         // keyframes whose poses the solver has still
   std::vector<std::uint32_t> behind_;    // poses of which the map has yet to be told; ascending
   std::vector<LandmarkId> doubted_;      // whose views the last update set aside; ascending
-  std::unordered_map<LandmarkId, KnownLandmark> landmarks_;
+  PagedTable<KnownLandmark> landmarks_;  // by id
   std::unordered_map<KeyframeId, KnownOdometry> odometry_;
   std::vector<PoseConstraint> new_loops_;
 };
