@@ -1,12 +1,12 @@
 #include "frontend/matching/patch_alignment.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+
+#include "frontend/matching/patch_sampling.h"
 
 namespace hybrid_slam {
 namespace {
@@ -19,88 +19,21 @@ using Samples = Eigen::VectorXf;
 // and times y (a gain that changes across the patch); x and y (a veil that does).
 enum Column { kShiftX, kShiftY, kGain, kGainX, kGainY, kVeilX, kVeilY, kColumns };
 using Columns = Eigen::Matrix<float, Eigen::Dynamic, kColumns>;
-using Normal = Eigen::Matrix<double, kColumns, kColumns>;
+using Normal = SummedProducts;
+static_assert(kColumns == kSummedColumns);
 
 // Texture below this has no place: sum of squared gradients per sample [(grey levels / px)^2].
 constexpr double kMinGradientEnergy = 0.5;
 constexpr double kMaxGainRatio = 4;
-constexpr int kMaxHalfSize = 50;
-constexpr float kGreyPerUnit = 1 / ImagePyramid::kUnits;
-
-// Weights of Catmull-Rom interpolation at -1, 0, 1, 2 for t in [0, 1), which sum to `sum`.
-std::array<float, 4> cubic_weights(float t, float sum = 1) {
-  const float t2 = t * t;
-  const float t3 = t2 * t;
-  const float half = 0.5F * sum;
-  return {half * (-t3 + 2 * t2 - t), half * (3 * t3 - 5 * t2 + 2), half * (-3 * t3 + 4 * t2 + t),
-          half * (t3 - t2)};
-}
-
-// The samples of a square of whole steps around (cx, cy), row by row: all share the same weights,
-// so that rows and columns can be interpolated one after the other.
-void sample_square(const Level& level, double cx, double cy, int half_size, Samples* samples) {
-  const double x = cx - half_size;
-  const double y = cy - half_size;
-  const int left = static_cast<int>(x);
-  const int top = static_cast<int>(y);
-  const std::array<float, 4> wx = cubic_weights(static_cast<float>(x - left));
-  const std::array<float, 4> wy = cubic_weights(static_cast<float>(y - top), kGreyPerUnit);
-  const int side = 2 * half_size + 1;
-  std::array<float, 2 * (kMaxHalfSize + 1) + 4> column;  // with the derivatives' rim
-  samples->resize(side * side);
-  float* sample = samples->data();
-  for (int v = 0; v < side; ++v) {
-    const std::uint16_t* p0 = level.row(top - 1 + v) + (left - 1);
-    const std::uint16_t* p1 = p0 + level.width;
-    const std::uint16_t* p2 = p1 + level.width;
-    const std::uint16_t* p3 = p2 + level.width;
-    for (int u = 0; u < side + 3; ++u) {
-      column[static_cast<std::size_t>(u)] =
-          wy[0] * p0[u] + wy[1] * p1[u] + wy[2] * p2[u] + wy[3] * p3[u];
-    }
-    const float* c = column.data();
-    for (int u = 0; u < side; ++u, ++c, ++sample) {
-      *sample = wx[0] * c[0] + wx[1] * c[1] + wx[2] * c[2] + wx[3] * c[3];
-    }
-  }
-}
-
-// A row of samples anywhere between pixels: one more step along the row is one of `step`. Weights
-// first, for several at once. Every sample needs floor(x) in 1 .. width - 3 and floor(y) in
-// 1 .. height - 3.
-void sample_row(const Level& level, const Eigen::Vector2d& centre, const Eigen::Vector2d& to_row,
-                const Eigen::Vector2d& step, int half_size, float* samples) {
-  constexpr std::size_t kMost = 2 * kMaxHalfSize + 1;
-  const auto count = static_cast<std::size_t>(2 * half_size + 1);
-  std::array<const std::uint16_t*, kMost> corner;  // of the 4 x 4 pixels around
-  std::array<float, kMost> tx, ty;
-  for (std::size_t i = 0; i < count; ++i) {
-    const int u = static_cast<int>(i) - half_size;
-    const double x = centre.x() + step.x() * u + to_row.x();
-    const double y = centre.y() + step.y() * u + to_row.y();
-    const int left = static_cast<int>(x);
-    const int top = static_cast<int>(y);
-    corner[i] = level.row(top - 1) + (left - 1);
-    tx[i] = static_cast<float>(x - left);
-    ty[i] = static_cast<float>(y - top);
-  }
-  std::array<std::array<float, 4>, kMost> wx, wy;
-  for (std::size_t i = 0; i < count; ++i) wx[i] = cubic_weights(tx[i]);
-  for (std::size_t i = 0; i < count; ++i) wy[i] = cubic_weights(ty[i], kGreyPerUnit);
-  for (std::size_t i = 0; i < count; ++i) {
-    float along[4];
-    for (int j = 0; j < 4; ++j) {
-      const std::uint16_t* p = corner[i] + j * level.width;
-      along[j] = wx[i][0] * p[0] + wx[i][1] * p[1] + wx[i][2] * p[2] + wx[i][3] * p[3];
-    }
-    samples[i] =
-        wy[i][0] * along[0] + wy[i][1] * along[1] + wy[i][2] * along[2] + wy[i][3] * along[3];
-  }
-}
 
 // Whether samples can be taken in the box centre +- (rx, ry).
 bool inside(const Level& level, double cx, double cy, double rx, double ry) {
   return cx - rx >= 1 && cy - ry >= 1 && cx + rx < level.width - 2 && cy + ry < level.height - 2;
+}
+
+Eigen::Index samples_of(int half_size) {
+  const Eigen::Index side = 2 * half_size + 1;
+  return side * side;
 }
 
 template <typename Vector>
@@ -118,16 +51,11 @@ bool sample_target(const Level& level, int half_size, const Eigen::Matrix2d& war
                    const Eigen::Vector2d& centre, Samples* samples) {
   const Eigen::Vector2d reach = half_size * warp.cwiseAbs().rowwise().sum();
   if (!inside(level, centre.x(), centre.y(), reach.x(), reach.y())) return false;
+  samples->resize(samples_of(half_size));
   if (warp.isIdentity(0)) {
-    sample_square(level, centre.x(), centre.y(), half_size, samples);
-    remove_mean(*samples);
-    return true;
-  }
-  const int side = 2 * half_size + 1;
-  samples->resize(side * side);
-  float* row = samples->data();
-  for (int v = -half_size; v <= half_size; ++v, row += side) {
-    sample_row(level, centre, warp.col(1) * v, warp.col(0), half_size, row);
+    sample_square(level, centre.x(), centre.y(), half_size, samples->data());
+  } else {
+    sample_warped(level, centre, warp, half_size, samples->data());
   }
   remove_mean(*samples);
   return true;
@@ -194,18 +122,10 @@ Columns columns_of(const Samples& samples, int half) {
   return columns;
 }
 
-// In double: what is sought is a small difference between columns that are much alike.
-Normal normal_of(const Columns& columns) {
-  const Eigen::Matrix<double, Eigen::Dynamic, kColumns> exact = columns.cast<double>();
-  Normal normal;
-  normal.noalias() = exact.transpose() * exact;
-  return normal;
-}
-
 }  // namespace
 
 std::string AlignmentOptions::validate() const {
-  if (half_size < 1 || half_size > kMaxHalfSize) return "half_size must lie in 1..50";
+  if (half_size < 1 || half_size > kMaxPatchHalfSize) return "half_size must lie in 1..50";
   if (!(scale_of_level0 > 0)) return "scale_of_level0 must be positive";
   if (max_iterations < 1) return "max_iterations must be positive";
   if (!(convergence > 0) || !(max_shift > 0)) return "convergence and max_shift must be positive";
@@ -225,10 +145,11 @@ std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, do
   const int half = options.half_size;
   if (!inside(level, cx, cy, half + 1, half + 1)) return std::nullopt;
 
-  Samples samples;
-  sample_square(level, cx, cy, half + 1, &samples);  // one more all around for the derivatives
+  Samples samples(samples_of(half + 1));
+  sample_square(level, cx, cy, half + 1,
+                samples.data());  // one more all around for the derivatives
   const Columns columns = columns_of(samples, half);
-  const Normal normal = normal_of(columns);
+  const Normal normal = sums_of_products(columns.data(), static_cast<std::size_t>(columns.rows()));
   const double least = kMinGradientEnergy * static_cast<double>(columns.rows());
   if (normal(kShiftX, kShiftX) + normal(kShiftY, kShiftY) < least) return std::nullopt;
   find_weights(columns, normal, options.horizontal_only, &patch);
