@@ -24,6 +24,30 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, kDescriptorBins>;
 using Vector = hn::Vec<Floats>;
 
+struct Pairs {
+  Vector first, second;
+};
+
+// What stands at these places and behind each of them. A pair is read at once.
+template <typename Index>
+HWY_INLINE Pairs read_pairs(const float* samples, Index index) {
+  const Floats d;
+#if HWY_TARGET == HWY_SCALAR
+  return {hn::GatherIndex(d, samples, index), hn::GatherIndex(d, samples + 1, index)};
+#else
+  const hn::Repartition<std::uint64_t, Floats> d64;
+  const hn::RebindToSigned<decltype(d64)> di64;
+  const hn::Rebind<std::int32_t, decltype(d64)> d32;
+  const auto* bytes = reinterpret_cast<const std::uint64_t*>(samples);
+  const auto offsets = hn::ShiftLeft<2>(index);
+  const auto low = hn::BitCast(
+      d, hn::GatherOffset(d64, bytes, hn::PromoteTo(di64, hn::LowerHalf(d32, offsets))));
+  const auto high = hn::BitCast(
+      d, hn::GatherOffset(d64, bytes, hn::PromoteTo(di64, hn::UpperHalf(d32, offsets))));
+  return {hn::ConcatEven(d, high, low), hn::ConcatOdd(d, high, low)};
+#endif
+}
+
 // read_level() for a vector of places.
 HWY_INLINE Vector read_places(const LevelView& level, Vector x, Vector y) {
   const Floats d;
@@ -38,11 +62,8 @@ HWY_INLINE Vector read_places(const LevelView& level, Vector x, Vector y) {
   const auto row = whole_and_rest(y, level.height);
   const auto stride = hn::Set(d32, static_cast<std::int32_t>(level.stride));
   const auto index = hn::Add(hn::Mul(row, stride), column);
-  const float* below = level.samples + level.stride;
-  const Vector a = hn::GatherIndex(d, level.samples, index);
-  const Vector b = hn::GatherIndex(d, level.samples + 1, index);
-  const Vector c = hn::GatherIndex(d, below, index);
-  const Vector e = hn::GatherIndex(d, below + 1, index);
+  const auto [a, b] = read_pairs(level.samples, index);
+  const auto [c, e] = read_pairs(level.samples + level.stride, index);
   const Vector upper = hn::MulAdd(x, hn::Sub(b, a), a);
   const Vector lower = hn::MulAdd(x, hn::Sub(e, c), c);
   return hn::MulAdd(y, hn::Sub(lower, upper), upper);
