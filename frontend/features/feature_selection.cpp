@@ -1,10 +1,13 @@
 #include "frontend/features/feature_selection.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <tuple>
 
+#include "frontend/features/key_sort.h"
 #include "frontend/features/spread_grid.h"
 
 namespace hybrid_slam {
@@ -18,28 +21,35 @@ bool inside(const Keypoint& keypoint, int width, int height) {
 
 auto strength(const Keypoint& k) { return std::tuple(-k.response, k.y, k.x, k.scale, k.angle); }
 
-// Those inside the image. The response, which decides nearly always, stands beside what is sorted.
+// The larger a number, the smaller its key.
+std::uint32_t descending_key(float value) {
+  constexpr std::uint32_t kSign = 0x80000000U;
+  const auto bits = std::bit_cast<std::uint32_t>(value + 0.0F);  // of zeros, the positive one
+  return (bits & kSign) != 0 ? bits : ~(bits | kSign);
+}
+
+// Those inside the image. The response decides nearly always.
 std::vector<int> by_strength(const std::vector<Keypoint>& keypoints, int width, int height) {
-  struct Ranked {
-    float response;
-    int index;
-  };
-  std::vector<Ranked> ranked;
+  std::vector<Keyed> ranked;
   ranked.reserve(keypoints.size());
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (!inside(keypoints[i], width, height)) continue;
-    ranked.push_back({keypoints[i].response, static_cast<int>(i)});
+    ranked.push_back({descending_key(keypoints[i].response), static_cast<std::uint32_t>(i)});
   }
-  const auto at = [&](const Ranked& one) -> const Keypoint& {
-    return keypoints[static_cast<std::size_t>(one.index)];
-  };
-  std::sort(ranked.begin(), ranked.end(), [&](const Ranked& a, const Ranked& b) {
-    if (a.response != b.response) return a.response > b.response;
-    return strength(at(a)) < strength(at(b));
-  });
+  sort_by_key(ranked);
+  for (auto begin = ranked.begin(); begin != ranked.end();) {
+    const auto end = std::find_if(begin, ranked.end(),
+                                  [&](const Keyed& other) { return other.key != begin->key; });
+    if (end - begin > 1) {
+      std::sort(begin, end, [&](const Keyed& a, const Keyed& b) {
+        return strength(keypoints[a.index]) < strength(keypoints[b.index]);
+      });
+    }
+    begin = end;
+  }
   std::vector<int> order;
   order.reserve(ranked.size());
-  for (const Ranked& one : ranked) order.push_back(one.index);
+  for (const Keyed& one : ranked) order.push_back(static_cast<int>(one.index));
   return order;
 }
 

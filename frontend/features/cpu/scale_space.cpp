@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <cstdint>
+
+#include "frontend/features/key_sort.h"
 
 namespace hybrid_slam::sift {
 namespace {
@@ -18,7 +20,11 @@ void halve(const float* row, int half_width, float* out) {
   for (int x = 0; x < half_width; ++x) out[x] = row[2 * x];
 }
 
-auto place(const RefinedExtremum& e) { return std::tuple(e.layer, e.y, e.x); }
+// Ascending by layer, row and column.
+std::uint64_t place(const RefinedExtremum& e) {
+  const auto bits = [](int number) { return static_cast<std::uint64_t>(number); };
+  return bits(e.layer) << 56 | bits(e.y) << 28 | bits(e.x);
+}
 
 }  // namespace
 
@@ -178,12 +184,17 @@ void ScaleSpace::search_row(const Octave& octave, int y) {
 
 // Two samples whose refinement ends at the same one are the same extremum.
 void ScaleSpace::collect(const Octave& octave, int number) {
-  const auto before = [](const auto& a, const auto& b) { return place(a) < place(b); };
-  const auto same = [](const auto& a, const auto& b) { return place(a) == place(b); };
-  std::sort(refined_.begin(), refined_.end(), before);
-  refined_.erase(std::unique(refined_.begin(), refined_.end(), same), refined_.end());
-  const float pixels = std::exp2(static_cast<float>(octave.index));
+  std::vector<Keyed> places;
+  places.reserve(refined_.size());
   for (const RefinedExtremum& r : refined_) {
+    places.push_back({place(r), static_cast<std::uint32_t>(places.size())});
+  }
+  sort_by_key(places);
+  const auto same = [](const Keyed& a, const Keyed& b) { return a.key == b.key; };
+  places.erase(std::unique(places.begin(), places.end(), same), places.end());
+  const float pixels = std::exp2(static_cast<float>(octave.index));
+  for (const Keyed& at : places) {
+    const RefinedExtremum& r = refined_[at.index];
     const float layer = static_cast<float>(r.layer) + r.to_layer;
     Extremum extremum;
     extremum.octave = number;

@@ -10,6 +10,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "frontend/features/key_sort.h"
+
 namespace hybrid_slam {
 namespace {
 
@@ -32,6 +34,33 @@ std::vector<Keypoint> crowd() {
   for (int i = 0; i < 2000; ++i)
     keypoints.push_back(keypoint(639 * unit(), 479 * unit(), 2 + unit()));
   return keypoints;
+}
+
+TEST_CASE("Keys are sorted in all their bits, and equal ones keep their order") {
+  std::mt19937_64 random(2);
+  for (const std::uint64_t bits :
+       {~std::uint64_t{0}, std::uint64_t{0xFF00FF}, std::uint64_t{7} << 60}) {
+    std::vector<Keyed> items;
+    for (std::uint32_t i = 0; i < 3000; ++i) items.push_back({random() & bits, i});
+    std::vector<Keyed> expected = items;
+    std::stable_sort(expected.begin(), expected.end(),
+                     [](const Keyed& a, const Keyed& b) { return a.key < b.key; });
+    sort_by_key(items);
+    const auto same = [](const Keyed& a, const Keyed& b) {
+      return a.key == b.key && a.index == b.index;
+    };
+    CHECK(std::equal(items.begin(), items.end(), expected.begin(), expected.end(), same));
+  }
+  std::vector<Keyed> none;
+  sort_by_key(none);
+  CHECK(none.empty());
+}
+
+TEST_CASE("select_spread orders by response, of whatever sign, then by place") {
+  const std::vector<Keypoint> keypoints = {keypoint(3, 3, -1),   keypoint(9, 9, 0),
+                                           keypoint(5, 5, -0.0), keypoint(7, 7, 2),
+                                           keypoint(6, 6, 2),    keypoint(8, 8, -3)};
+  CHECK(select_spread(keypoints, 20, 20, 6) == std::vector<int>{4, 3, 2, 1, 0, 5});
 }
 
 TEST_CASE("select_spread keeps all while there are no more than asked for") {
