@@ -127,29 +127,36 @@ std::vector<std::uint32_t> PoseTree::detach(const std::vector<std::uint32_t>& to
   return poses;
 }
 
-// Terms of which every pose is among these (local_ is set): the others belong to subtrees below.
-std::vector<std::uint32_t> PoseTree::terms_inside(const std::vector<std::uint32_t>& poses,
-                                                  const TermSource& terms) {
+// Of the terms of which every pose is among these (local_ is set): the others belong to subtrees
+// below. Those of the orphans come last.
+PoseTree::Groups PoseTree::groups_inside(const std::vector<std::uint32_t>& poses,
+                                         const std::vector<std::int32_t>& orphans,
+                                         const TermSource& terms) {
   ++look_;
-  std::vector<std::uint32_t> inside;
+  std::vector<std::uint32_t> met;
   for (const std::uint32_t pose : poses) {
     for (const std::uint32_t term : terms.terms_of(pose)) {
       if (term >= looked_at_.size()) looked_at_.resize(term + 1, 0);
-      if (std::exchange(looked_at_[term], look_) != look_) inside.push_back(term);
+      if (std::exchange(looked_at_[term], look_) != look_) met.push_back(term);
     }
   }
-  std::sort(inside.begin(), inside.end());
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < inside.size(); ++i) {
-    terms.fetch_poses(inside, i);
-    const auto members = terms.poses_of(inside[i]);
+  std::sort(met.begin(), met.end());
+  Groups groups;
+  const auto add = [&](std::span<const std::uint32_t> members) {
+    for (const std::uint32_t pose : members) groups.members.push_back(local_[pose]);
+    groups.first.push_back(groups.members.size());
+  };
+  for (std::size_t i = 0; i < met.size(); ++i) {
+    terms.fetch_poses(met, i);
+    const auto members = terms.poses_of(met[i]);
     if (std::all_of(members.begin(), members.end(),
                     [&](std::uint32_t member) { return local_[member] != kOutside; })) {
-      inside[kept++] = inside[i];
+      groups.terms.push_back(met[i]);
+      add(members);
     }
   }
-  inside.resize(kept);
-  return inside;
+  for (const std::int32_t orphan : orphans) add(at(orphan).separator);
+  return groups;
 }
 
 // Terms that have one of the clique's frontals and nothing that is eliminated below it.
@@ -173,23 +180,27 @@ std::vector<std::uint32_t> PoseTree::own_terms(const Clique& clique,
   return own;
 }
 
-// Which of these poses share a term or a separator, by their places in `poses`.
-std::vector<std::vector<std::uint32_t>> PoseTree::adjacency_of(
-    const std::vector<std::uint32_t>& poses, const std::vector<std::uint32_t>& inside,
-    const std::vector<std::int32_t>& orphans, const TermSource& terms) const {
-  std::vector<std::vector<std::span<const std::uint32_t>>> groups(poses.size());  // of each pose
-  const auto connect = [&](std::span<const std::uint32_t> members) {
-    for (const std::uint32_t pose : members) groups[local_[pose]].push_back(members);
-  };
-  for (const std::uint32_t term : inside) connect(terms.poses_of(term));
-  for (const std::int32_t orphan : orphans) connect(at(orphan).separator);
-  std::vector<std::vector<std::uint32_t>> adjacency(poses.size());
-  std::vector<std::uint32_t> neighbour_of(poses.size(), kOutside);  // the last of which it is one
-  for (std::uint32_t i = 0; i < poses.size(); ++i) {
+// Which of so many poses share a term or a separator.
+std::vector<std::vector<std::uint32_t>> PoseTree::adjacency_of(std::size_t poses,
+                                                               const Groups& groups) {
+  // Which groups each pose is in, one pose after the other.
+  std::vector<std::size_t> first(poses + 1, 0);
+  for (const std::uint32_t pose : groups.members) ++first[pose + 1];
+  for (std::size_t i = 0; i < poses; ++i) first[i + 1] += first[i];
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  std::vector<std::uint32_t> groups_of(groups.members.size());
+  for (std::size_t group = 0; group < groups.size(); ++group) {
+    for (const std::uint32_t pose : groups.of(group)) {
+      groups_of[next[pose]++] = static_cast<std::uint32_t>(group);
+    }
+  }
+  std::vector<std::vector<std::uint32_t>> adjacency(poses);
+  std::vector<std::uint32_t> neighbour_of(poses, kOutside);  // the last of which it is one
+  for (std::uint32_t i = 0; i < poses; ++i) {
     neighbour_of[i] = i;
-    for (const std::span<const std::uint32_t> members : groups[i]) {
-      for (const std::uint32_t pose : members) {
-        if (std::exchange(neighbour_of[local_[pose]], i) != i) adjacency[i].push_back(local_[pose]);
+    for (std::size_t k = first[i]; k < first[i + 1]; ++k) {
+      for (const std::uint32_t pose : groups.of(groups_of[k])) {
+        if (std::exchange(neighbour_of[pose], i) != i) adjacency[i].push_back(pose);
       }
     }
     std::sort(adjacency[i].begin(), adjacency[i].end());
@@ -198,10 +209,8 @@ std::vector<std::vector<std::uint32_t>> PoseTree::adjacency_of(
 }
 
 std::vector<std::int32_t> PoseTree::build_cliques(const std::vector<std::uint32_t>& poses,
-                                                  const std::vector<std::uint32_t>& inside,
-                                                  const std::vector<std::int32_t>& orphans,
-                                                  const std::vector<std::uint32_t>& newest,
-                                                  const TermSource& terms) {
+                                                  const Groups& groups,
+                                                  const std::vector<std::uint32_t>& newest) {
   std::vector<char> last(poses.size(), 0);
   for (const std::uint32_t pose : newest) {
     if (local_[pose] != kOutside) last[local_[pose]] = 1;
@@ -215,7 +224,7 @@ std::vector<std::int32_t> PoseTree::build_cliques(const std::vector<std::uint32_
   }
 
   const auto eliminated =
-      eliminate(adjacency_of(poses, inside, orphans, terms), last, options_.max_padding, sizes);
+      eliminate(adjacency_of(poses.size(), groups), last, options_.max_padding, sizes);
   std::vector<std::int32_t> made;
   made.reserve(eliminated.size());
   for (const EliminationClique& wanted : eliminated) {
@@ -236,27 +245,29 @@ std::vector<std::int32_t> PoseTree::build_cliques(const std::vector<std::uint32_
 // Hangs the orphans on the cliques that were made, and returns the terms of each of these. What
 // has several poses belongs to the clique that eliminates the first of them: the deepest, which
 // `made` holds last.
-std::vector<std::vector<std::uint32_t>> PoseTree::attach(const std::vector<std::int32_t>& made,
-                                                         const std::vector<std::uint32_t>& inside,
-                                                         const std::vector<std::int32_t>& orphans,
-                                                         const TermSource& terms) {
+std::vector<std::vector<std::uint32_t>> PoseTree::attach(const std::vector<std::uint32_t>& poses,
+                                                         const std::vector<std::int32_t>& made,
+                                                         const Groups& groups,
+                                                         const std::vector<std::int32_t>& orphans) {
   std::vector<std::int32_t> depth(cliques_.size(), kNone);
   for (std::size_t i = 0; i < made.size(); ++i) {
     depth[static_cast<std::size_t>(made[i])] = static_cast<std::int32_t>(i);
   }
-  const auto deepest = [&](std::span<const std::uint32_t> members) {
+  const auto deepest = [&](std::size_t group) {
     std::int32_t found = 0;
-    for (const std::uint32_t pose : members) {
-      found = std::max(found, depth[static_cast<std::size_t>(clique_of_[pose])]);
+    for (const std::uint32_t i : groups.of(group)) {
+      found = std::max(found, depth[static_cast<std::size_t>(clique_of_[poses[i]])]);
     }
     return static_cast<std::size_t>(found);
   };
+  const std::size_t terms = groups.terms.size();
   std::vector<std::vector<std::uint32_t>> own(made.size());
-  for (const std::uint32_t term : inside) own[deepest(terms.poses_of(term))].push_back(term);
-  for (const std::int32_t orphan : orphans) {
+  for (std::size_t i = 0; i < terms; ++i) own[deepest(i)].push_back(groups.terms[i]);
+  for (std::size_t i = 0; i < orphans.size(); ++i) {
+    const std::int32_t orphan = orphans[i];
     at(orphan).parent = kNone;
     if (at(orphan).separator.empty()) continue;
-    const std::int32_t parent = made[deepest(at(orphan).separator)];
+    const std::int32_t parent = made[deepest(terms + i)];
     at(orphan).parent = parent;
     at(parent).children.push_back(orphan);
   }
@@ -269,10 +280,10 @@ void PoseTree::refactor(const std::vector<std::uint32_t>& touched,
   std::vector<std::uint32_t> poses = detach(touched, orphans);
   std::erase_if(poses, [&](std::uint32_t pose) { return !terms.has_terms(pose); });
   for (std::uint32_t i = 0; i < poses.size(); ++i) local_[poses[i]] = i;
-  const std::vector<std::uint32_t> inside = terms_inside(poses, terms);
-  const std::vector<std::int32_t> made = build_cliques(poses, inside, orphans, newest, terms);
+  const Groups groups = groups_inside(poses, orphans, terms);
+  const std::vector<std::int32_t> made = build_cliques(poses, groups, newest);
 
-  const auto own = attach(made, inside, orphans, terms);
+  const auto own = attach(poses, made, groups, orphans);
   for (const std::uint32_t pose : poses) local_[pose] = kOutside;
 
   last_cost_ = 0;

@@ -149,26 +149,35 @@ class PoseTree {
   Clique& at(std::int32_t i) { return cliques_[static_cast<std::size_t>(i)]; }
   const Clique& at(std::int32_t i) const { return cliques_[static_cast<std::size_t>(i)]; }
 
+  // Poses that belong together: of terms, then of the separators of subtrees. They are listed once,
+  // side by side: terms' own lists lie anywhere in memory.
+  struct Groups {
+    std::vector<std::uint32_t> terms;
+    std::vector<std::uint32_t> members;    // by their places among the poses at hand
+    std::vector<std::size_t> first = {0};  // of each group's members; and the number of all
+
+    std::size_t size() const { return first.size() - 1; }
+    std::span<const std::uint32_t> of(std::size_t group) const {
+      return std::span(members).subspan(first[group], first[group + 1] - first[group]);
+    }
+  };
+
   // The tree's shape: pose_tree.cpp.
   std::int32_t make_clique();
   std::vector<std::uint32_t> detach(const std::vector<std::uint32_t>& touched,
                                     std::vector<std::int32_t>& orphans);
-  std::vector<std::uint32_t> terms_inside(const std::vector<std::uint32_t>& poses,
-                                          const TermSource& terms);
+  Groups groups_inside(const std::vector<std::uint32_t>& poses,
+                       const std::vector<std::int32_t>& orphans, const TermSource& terms);
   std::vector<std::uint32_t> own_terms(const Clique& clique, const TermSource& terms) const;
-  std::vector<std::vector<std::uint32_t>> adjacency_of(const std::vector<std::uint32_t>& poses,
-                                                       const std::vector<std::uint32_t>& inside,
-                                                       const std::vector<std::int32_t>& orphans,
-                                                       const TermSource& terms) const;
+  static std::vector<std::vector<std::uint32_t>> adjacency_of(std::size_t poses,
+                                                              const Groups& groups);
   std::vector<std::int32_t> build_cliques(const std::vector<std::uint32_t>& poses,
-                                          const std::vector<std::uint32_t>& inside,
-                                          const std::vector<std::int32_t>& orphans,
-                                          const std::vector<std::uint32_t>& newest,
-                                          const TermSource& terms);
-  std::vector<std::vector<std::uint32_t>> attach(const std::vector<std::int32_t>& made,
-                                                 const std::vector<std::uint32_t>& inside,
-                                                 const std::vector<std::int32_t>& orphans,
-                                                 const TermSource& terms);
+                                          const Groups& groups,
+                                          const std::vector<std::uint32_t>& newest);
+  std::vector<std::vector<std::uint32_t>> attach(const std::vector<std::uint32_t>& poses,
+                                                 const std::vector<std::int32_t>& made,
+                                                 const Groups& groups,
+                                                 const std::vector<std::int32_t>& orphans);
 
   // Its factors: tree_factorization.cpp.
   static double factor_cost(Eigen::Index frontals, Eigen::Index separator);
