@@ -12,8 +12,9 @@ namespace hybrid_slam {
 
 namespace {
 
-// Condensed landmarks keep their place before their anchor while the poses that see them have not
-// moved against one another by more than this, in standard deviations of an observation.
+// Condensed landmarks keep their place before their anchor, and are not evaluated, while the poses
+// that see them have not moved against one another by more than this, in standard deviations of an
+// observation.
 constexpr double kStill = 0.05;
 
 }  // namespace
@@ -79,17 +80,28 @@ std::vector<double> IncrementalSolver::shape_change(const CondensedTerm& term,
   return change;
 }
 
+bool IncrementalSolver::is_still(const CondensedTerm& term, const Eigen::VectorXd& since) const {
+  const std::vector<double> change = shape_change(term, since);
+  return std::all_of(change.begin(), change.end(),
+                     [](double by_view) { return by_view <= kStill; });
+}
+
+// Whether there is anything to evaluate. Far terms move along with all else at each update.
+bool IncrementalSolver::has_changed(const CondensedTerm& term) const {
+  return !is_still(term, term.evaluated_at.cast<double>()) ||
+         (!term.is_stale && !is_still(term, term.placed));
+}
+
 IncrementalSolver::Evaluation IncrementalSolver::evaluate_condensed(std::uint32_t index) {
   CondensedTerm& term = condensed_[index];
   Evaluation result;
   if (term.members.empty()) return result;
-  result.squared_norm = std::max(term.squared_norm_at(deltas_of(term.poses)), 0.0);
+  const Eigen::VectorXd deltas = deltas_of(term.poses);
+  term.evaluated_at = deltas.cast<float>();
+  result.squared_norm = std::max(term.squared_norm_at(deltas), 0.0);
   result.cost = std::max(result.squared_norm + term.loss_excess, 0.0);
   result.rows = term.rows;
-  if (!term.is_stale) {
-    const std::vector<double> since_placed = shape_change(term, term.placed);
-    term.is_stale = *std::max_element(since_placed.begin(), since_placed.end()) > kStill;
-  }
+  term.is_stale = term.is_stale || !is_still(term, term.placed);
   const std::vector<double> change = shape_change(term, term.at);
   for (std::size_t i = 0; i < change.size(); ++i) {
     const CondensedTerm::Reach& reach = term.reach[i];

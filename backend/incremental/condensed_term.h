@@ -52,9 +52,10 @@ struct CondensedTerm {
   double squared_norm = 0;                   // likewise: of the weighted residuals
   double loss_excess = 0;                    // what the losses make of that, beyond it
   int rows = 0;
-  std::vector<Reach> reach;  // by pose
-  Eigen::VectorXd placed;    // the poses' deltas when the members' points were minimised
-  bool is_stale = false;     // its views have changed since, so that they are to be once more
+  std::vector<Reach> reach;      // by pose
+  Eigen::VectorXd placed;        // the poses' deltas when the members' points were minimised
+  bool is_stale = false;         // its views have changed since, so that they are to be once more
+  Eigen::VectorXf evaluated_at;  // the poses' deltas when it was evaluated last
 
   std::span<const std::uint32_t> observations_of(std::size_t member) const;
   // Members that were added come in among the others.

@@ -53,6 +53,7 @@ struct UpdateSummary {
   std::size_t undetermined = 0;      // directions that no term determines, and that were held
   std::size_t poses = 0;             // factored anew, over all steps
   std::size_t relinearized = 0;      // terms
+  std::size_t evaluated = 0;         // rows of terms, after all steps
   std::size_t pending = 0;           // terms that wait to be linearised anew
   std::vector<std::uint32_t> moved;  // poses whose estimate changed, ascending
   std::vector<std::uint32_t> moved_blocks;  // likewise

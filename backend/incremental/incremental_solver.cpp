@@ -334,6 +334,7 @@ std::size_t IncrementalSolver::choose(bool again) {
 
 UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
   UpdateSummary summary;
+  evaluated_ = 0;
   credit_ = std::min(credit_ + options_.budget, options_.burst * options_.budget);
   bool to_solve = !jumped_.empty();
   if (to_solve) {
@@ -353,6 +354,7 @@ UpdateSummary IncrementalSolver::update(const std::stop_token& stop) {
     std::sort(moved->begin(), moved->end());
     moved->erase(std::unique(moved->begin(), moved->end()), moved->end());
   }
+  summary.evaluated = evaluated_;
   if (!summary.stopped) {
     newest_.clear();
     summary.marginalized = slide_window();

@@ -265,6 +265,7 @@ class IncrementalSolver final : private TermSource {
   void note_reach(LandmarkTerm& landmark) const;
   void note_evaluated(LandmarkTerm& landmark) const;
   bool has_changed(const LandmarkTerm& landmark) const;
+  bool has_changed(const CondensedTerm& term) const;
   bool has_changed(const Term& term) const;
   void check(const std::vector<std::uint32_t>& linearized, const std::vector<std::uint32_t>& moved);
   std::size_t choose(bool again);
@@ -312,6 +313,7 @@ class IncrementalSolver final : private TermSource {
   Eigen::VectorXd deltas_before(const std::vector<std::uint32_t>& poses, const CondensedTerm& term,
                                 const Eigen::VectorXd& since) const;
   std::vector<double> shape_change(const CondensedTerm& term, const Eigen::VectorXd& since) const;
+  bool is_still(const CondensedTerm& term, const Eigen::VectorXd& since) const;
   Eigen::Vector3d kept_place(const CondensedTerm::Member& member) const;
   std::optional<Eigen::Vector3d> best_place(const CondensedTerm& term, std::size_t member) const;
   LandmarkTerm taken_out(const CondensedTerm& term, std::size_t member) const;
@@ -382,8 +384,9 @@ class IncrementalSolver final : private TermSource {
   std::uint64_t stamp_ = 0;
   double squared_norm_ = 0;  // of all terms
   double rows_ = 0;
-  double mismatch_ = 0;  // of all terms, squared
-  double credit_ = 0;    // multiplications
+  double mismatch_ = 0;        // of all terms, squared
+  double credit_ = 0;          // multiplications
+  std::size_t evaluated_ = 0;  // rows, in this update
   // Of the step at hand.
   std::uint64_t step_ = 0;
   double rise_ = 0;                    // of the cost, twice

@@ -81,7 +81,9 @@ void IncrementalSolver::note_evaluated(LandmarkTerm& landmark) const {
 
 // Of a term of another kind it is not known.
 bool IncrementalSolver::has_changed(const Term& term) const {
-  if (term.kind != TermKind::kLandmark || term.dirty) return true;
+  if (term.dirty) return true;
+  if (term.kind == TermKind::kCondensed) return has_changed(condensed_[term.index]);
+  if (term.kind != TermKind::kLandmark) return true;
   const LandmarkTerm& landmark = *landmarks_[term.index];
   return landmark.factors.empty() || has_changed(landmark);
 }

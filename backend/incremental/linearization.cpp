@@ -260,6 +260,7 @@ void IncrementalSolver::evaluate(std::uint32_t id) {
     term.start_cost = term.cost;
     judged_.push_back(id);
   }
+  evaluated_ += static_cast<std::size_t>(at.rows);
   rise_ += at.cost - term.cost;
   term.cost = at.cost;
   squared_norm_ += at.squared_norm - term.squared_norm;

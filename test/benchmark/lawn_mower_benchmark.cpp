@@ -109,7 +109,8 @@ int run(int keyframes, int window, bool compare) {
   std::vector<double> memory;  // at the end of each block
   std::size_t relinearized = 0;
   std::size_t moved = 0;
-  std::printf("keyframes  mean ms   max ms  solver MB  relinearized  moved  pending\n");
+  std::size_t evaluated = 0;
+  std::printf("keyframes  mean ms   max ms  solver MB  relinearized  moved  evaluated  pending\n");
   while (!feed.done()) {
     feed.add_next();
     const double start = cpu_milliseconds();
@@ -117,15 +118,16 @@ int run(int keyframes, int window, bool compare) {
     times.push_back(cpu_milliseconds() - start);
     relinearized += summary.relinearized;
     moved += summary.moved.size();
+    evaluated += summary.evaluated;
     if (times.size() % block != 0) continue;
     memory.push_back(allocated_megabytes() - before);
     const auto first = times.end() - static_cast<std::ptrdiff_t>(block);
-    std::printf("%9zu %8.2f %8.2f %10.1f %13zu %6zu %8zu\n", times.size(),
+    std::printf("%9zu %8.2f %8.2f %10.1f %13zu %6zu %10zu %8zu\n", times.size(),
                 std::accumulate(first, times.end(), 0.0) / static_cast<double>(block),
                 *std::max_element(first, times.end()), memory.back(), relinearized / block,
-                moved / block, summary.pending);
+                moved / block, evaluated / block, summary.pending);
     std::fflush(stdout);
-    relinearized = moved = 0;
+    relinearized = moved = evaluated = 0;
   }
   std::printf("KB per keyframe over the second half: %.1f\n",
               (memory.back() - memory[memory.size() / 2 - 1]) * 2000 / keyframes);

@@ -183,9 +183,13 @@ TEST_CASE("condensed landmarks: what an update looks at does not grow with the s
   std::size_t most_early = 0;
   std::size_t most_late = 0;
   std::size_t points = 0;
+  std::size_t evaluated_early = 0;
+  std::size_t evaluated_late = 0;
   while (!feed.done()) {
-    feed.feed_next();
+    const std::size_t evaluated = feed.feed_next().evaluated;
     const std::size_t count = feed.solver().pose_count();
+    if (count > 400 && count <= 600) evaluated_early += evaluated;
+    if (count > 800) evaluated_late += evaluated;
     if (count % 20 != 0) continue;
     points = feed.solver().graph().points.size();
     const std::size_t live = points - feed.solver().condensed_count();
@@ -194,6 +198,7 @@ TEST_CASE("condensed landmarks: what an update looks at does not grow with the s
   }
   CHECK(static_cast<double>(most_late) < 1.25 * static_cast<double>(most_early));
   CHECK(most_late < points / 4);
+  CHECK(static_cast<double>(evaluated_late) < 1.25 * static_cast<double>(evaluated_early));
   CHECK(excess(feed.solver()) < 0.01);
 }
 
