@@ -38,6 +38,7 @@ Rigid3d scaled(const Rigid3d& transform, double scale) {
 
 std::shared_ptr<const FrameObservations> shifted(const FrameObservations& seen, double by) {
   auto result = std::make_shared<FrameObservations>(seen);
+  if (result->disparity_offset) *result->disparity_offset += by;
   for (std::size_t i = 0; i < result->u_right.size(); ++i) {
     float& u_right = result->u_right[i];
     u_right -= static_cast<float>(by);

@@ -26,6 +26,7 @@ std::shared_ptr<const FrameObservations> chosen(const FrameObservations& all,
   some->features.keypoints = chosen(all.features.keypoints, kept);
   some->features.descriptors = chosen(all.features.descriptors, kept);
   if (!all.u_right.empty()) some->u_right = chosen(all.u_right, kept);
+  some->disparity_offset = all.disparity_offset;
   some->dropped = all.dropped + static_cast<std::uint32_t>(all.size() - kept.size());
   return some;
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "backend/map/features.h"
@@ -22,6 +23,9 @@ struct FrameObservations {
   FeatureSet features;
   std::vector<float>
       u_right;  // stereo: one per keypoint [px], kNoRightMatch where there is none; mono: empty
+  // Stereo: what was taken out of u_right for an imperfect rectification [px]; none where that is
+  // not known (a keyframe of another run).
+  std::optional<double> disparity_offset;
   // Features that are no longer here, since Map::drop_features() or before the map was saved.
   std::uint32_t dropped = 0;
 

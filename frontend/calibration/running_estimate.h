@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <optional>
 
@@ -23,44 +21,20 @@ class RunningEstimate {
   // common. `min_significance`: standard deviations from 0 before it is used. `start`: of an
   // earlier run, in the place of the prior.
   RunningEstimate(double prior_sigma, double share, double min_significance,
-                  const std::optional<FoundParameter>& start = std::nullopt)
-      : share_(share),
-        min_significance_(min_significance),
-        prior_information_(1 / (prior_sigma * prior_sigma)),
-        information_(start ? 0 : prior_information_),
-        start_(start),
-        start_information_(start ? 1 / (start->sigma * start->sigma) : 0),
-        in_use_(start ? start->in_use : 0) {}
+                  const std::optional<FoundParameter>& start = std::nullopt);
 
   // `systematic`: what may shift all measurements alike.
-  void add(double value, double information, double systematic = 0) {
-    const double kept = 1 - 1 / kMemory;
-    const double added = share_ * information;
-    information_ = kept * information_ + added;
-    weighted_ = kept * weighted_ + added * value;
-    squares_ = kept * squares_ + added * value * value;
-    systematic_ = kept * systematic_ + added * systematic;
-    count_ = kept * count_ + 1;
-    start_information_ *= kept;
-    if (++measurements_ < next_) return;
-    next_ *= 2;
-    if (start_ && measurements_ >= kFewest && is_contradicted()) forget_start();
-    const FoundParameter now = state();
-    const double sigma = std::hypot(now.sigma, now.systematic);
-    in_use_ = std::abs(now.value) > min_significance_ * sigma ? now.value : 0;
-  }
+  void add(double value, double information, double systematic = 0);
+
+  // What was measured so far may be off by as much besides: it weighs no more than that allows.
+  void doubt(double sigma);
 
   double value_now() const { return state().value; }
   double in_use() const { return in_use_; }
-  double sigma() const {
-    const FoundParameter now = state();
-    return std::hypot(now.sigma, now.systematic);
-  }
+  double sigma() const;
 
   // For the next run to begin with; none before anything is known.
-  std::optional<FoundParameter> found() const {
-    return start_ || measurements_ > 0 ? std::optional(state()) : std::nullopt;
-  }
+  std::optional<FoundParameter> found() const;
   // Whether it began with something that turned out to be no longer so.
   bool contradicts_start() const { return contradicts_start_; }
 
@@ -70,41 +44,11 @@ class RunningEstimate {
   static constexpr std::size_t kFewest = 8;
   static constexpr double kAccident = 4.89;  // once in a million: standard deviations, two-sided
 
-  FoundParameter state() const {
-    if (!start_) return own();
-    if (information_ == 0) return *start_;
-    const FoundParameter mine = own();
-    const double weight = 1 / (mine.sigma * mine.sigma);
-    const double sum = weight + start_information_;
-    return {(weight * mine.value + start_information_ * start_->value) / sum, 1 / std::sqrt(sum),
-            (weight * mine.systematic + start_information_ * start_->systematic) / sum, in_use_};
-  }
-
-  // By this run's measurements alone, and the prior if there was no start.
-  FoundParameter own() const {
-    return {weighted_ / information_, std::sqrt(scatter() / information_),
-            systematic_ / information_, in_use_};
-  }
-
-  bool is_contradicted() const {
-    const FoundParameter mine = own();
-    const double sigma = std::hypot(std::hypot(mine.sigma, mine.systematic),
-                                    std::hypot(start_->sigma, start_->systematic));
-    return std::abs(mine.value - start_->value) > kAccident * sigma;
-  }
-
-  void forget_start() {
-    start_.reset();
-    start_information_ = 0;
-    information_ += prior_information_;
-    contradicts_start_ = true;
-  }
-
-  // Mean square of the deviations from the mean, over what the weights promise; 1 or more.
-  double scatter() const {
-    const double deviations = squares_ - weighted_ * weighted_ / information_;
-    return count_ > 2 ? std::max(1.0, deviations / (share_ * (count_ - 1))) : 1;
-  }
+  FoundParameter state() const;
+  FoundParameter own() const;
+  bool is_contradicted() const;
+  void forget_start();
+  double scatter() const;
 
   double share_;
   double min_significance_;

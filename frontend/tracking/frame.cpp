@@ -31,6 +31,7 @@ std::shared_ptr<FrameObservations> make_observations(CameraId camera, const Fram
   observations->time = frame.time;
   observations->features = frame.features.left;
   observations->u_right = frame.features.u_right;
+  if (!frame.features.u_right.empty()) observations->disparity_offset = frame.u_right_correction;
   return observations;
 }
 

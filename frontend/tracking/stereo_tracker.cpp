@@ -82,7 +82,7 @@ StereoTracker::StereoTracker(CameraId camera_id, const Calibrated<RectifiedStere
       camera_(camera),
       options_(options),
       ladder_(camera, options.odometer),
-      disparity_(camera, options.disparity, known.disparity),
+      disparity_(camera_id, camera, options.disparity, known.disparity),
       matcher_(camera_id, camera, options, std::move(places), known.shading),
       moving_(camera.width, camera.height),
       last_(camera_id) {
@@ -100,6 +100,7 @@ TrackedFrame StereoTracker::track(Frame frame, const MapSnapshot& map, bool allo
   }
   last_.follow(map);
   if (uncertain_) uncertain_ = present(map, *uncertain_);
+  disparity_.follow(map);
   correct_disparities(frame);
   TrackedFrame result;
   result.frame_index = frame.index;
@@ -163,6 +164,7 @@ void StereoTracker::track_onwards(Frame& frame, const MapSnapshot& map, TrackedF
       result.inliers = matcher_.refine(map, match->search, frame, others).inliers;
       result.counts.found = valid_ids(frame.landmarks);
     }
+    learn_offset(frame, map, result.reference);
     uncertain_ =
         hybrid_slam::uncertain_pose(map, camera_, camera_id_, frame, result.reference,
                                     options_.pose, others, uncertain_ ? &*uncertain_ : nullptr);
@@ -253,10 +255,8 @@ void StereoTracker::correct_disparities(Frame& frame) const {
 std::optional<LadderStep> StereoTracker::predict(Frame& frame, TrackedFrame& result) {
   const Frame& last = last_.frame();
   auto step = ladder_.climb(last, frame);
-  if (step && step->rung == Prediction::kOdometer) {
-    disparity_.add(last.features, last.u_right_correction, frame.features, frame.u_right_correction,
-                   step->motion);
-    if (options_.moving_regions && step->believed) learn_moving(*step, frame);
+  if (step && step->rung == Prediction::kOdometer && step->believed && options_.moving_regions) {
+    learn_moving(*step, frame);
   }
   if (!step) step = across_gap(frame);
   if (step) {

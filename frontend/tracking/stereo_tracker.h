@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "backend/map/map_snapshot.h"
-#include "frontend/odometry/disparity_calibrator.h"
+#include "frontend/calibration/disparity_calibrator.h"
 #include "frontend/odometry/odometry_chain.h"
 #include "frontend/tracking/frame.h"
 #include "frontend/tracking/last_frame.h"
@@ -107,6 +107,7 @@ class StereoTracker {
   void bridge_chain(const MapSnapshot& map, const std::optional<UncertainPose>& last);
   bool wants_keyframe(const Frame& frame, const MapSnapshot& map, const TrackedFrame& result) const;
   NewKeyframe make_keyframe(const Frame& frame, const MapSnapshot& map, KeyframeId reference) const;
+  void learn_offset(const Frame& frame, const MapSnapshot& map, KeyframeId reference);
   void learn_moving(const LadderStep& step, const Frame& frame);
   LeftOutKeypoints moving(const Frame& frame) const;
   double close_depth() const { return options_.close_baselines * baseline(camera_); }

