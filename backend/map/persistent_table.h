@@ -8,8 +8,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "backend/map/block_pool.h"
-
 namespace hybrid_slam {
 
 // A table from a dense index to a value, of which complete copies cost O(1): share() hands out a
@@ -78,10 +76,10 @@ class PersistentTable {
     while (root_ == nullptr || out_of_reach(index)) grow();
     std::shared_ptr<Node>* node = &root_;
     for (unsigned level = levels_; level-- > 0;) {
-      if (*node == nullptr) *node = make<Inner>(epoch_);
+      if (*node == nullptr) *node = std::make_shared<Inner>(epoch_);
       node = &own<Inner>(*node).child[slot(index, level)];
     }
-    auto box = make<Box>(epoch_, std::move(value));
+    auto box = std::make_shared<Box>(epoch_, std::move(value));
     T& stored = box->value;
     *node = std::move(box);
     ++size_;
@@ -127,11 +125,6 @@ class PersistentTable {
     T value;
   };
 
-  template <typename N, typename... Arguments>
-  static std::shared_ptr<N> make(Arguments&&... arguments) {
-    return std::allocate_shared<N>(PoolAllocator<N>(), std::forward<Arguments>(arguments)...);
-  }
-
   static std::size_t slot(std::uint64_t index, unsigned level) {
     return static_cast<std::size_t>(index >> (level * kBits)) & (kFanOut - 1);
   }
@@ -141,7 +134,7 @@ class PersistentTable {
   }
 
   void grow() {
-    auto root = make<Inner>(epoch_);
+    auto root = std::make_shared<Inner>(epoch_);
     root->child[0] = std::move(root_);
     root_ = std::move(root);
     ++levels_;
@@ -151,7 +144,7 @@ class PersistentTable {
   template <typename N>
   N& own(std::shared_ptr<Node>& node) {
     if (node->epoch != epoch_) {
-      auto copy = make<N>(static_cast<const N&>(*node));
+      auto copy = std::make_shared<N>(static_cast<const N&>(*node));
       copy->epoch = epoch_;
       node = std::move(copy);
     }
