@@ -23,7 +23,7 @@ SiftOptions fisheye_sift(const SlamOptions& options) {
 // By an extractor of the pool. Adds what took time on a device, if there is one, under names that
 // begin with `stage`: how long all extractors were in use by other threads, then the device's own
 // time for each image.
-std::vector<FeatureSet> find_by(SiftPool& pool, std::span<const SiftBatch::Input> images,
+std::vector<FeatureSet> find_by(SiftPool& pool, std::span<const GrayImage* const> images,
                                 const GrayImage* mask, const std::string& stage,
                                 StageTimes& times) {
   StageClock waiting(times);
@@ -57,34 +57,13 @@ GrayImage both(const GrayImage& a, const GrayImage& b) {
   return mask;
 }
 
-// A pair as features are looked for in it.
-struct QuietPair {
-  StereoImages images;
-  StereoNoise noise;
-};
-
-// None where there is little noise. `dark`: it is that of little light.
-std::optional<QuietPair> quietened(const StereoImages& images, bool dark) {
-  if (!dark && !is_noisy(images.left) && !is_noisy(images.right)) return std::nullopt;
-  QuietPair quiet{images, {}};
-  const auto quieten = [&](GrayImage& image) {
-    return dark || is_noisy(image) ? suppress_noise(image) : sift::ImageNoise{};
-  };
-  quiet.noise = {quieten(quiet.images.left), quieten(quiet.images.right)};
+// None where there is little noise.
+std::optional<StereoImages> quietened(const StereoImages& images) {
+  if (!is_noisy(images.left) && !is_noisy(images.right)) return std::nullopt;
+  StereoImages quiet = images;
+  suppress_noise(quiet.left);
+  suppress_noise(quiet.right);
   return quiet;
-}
-
-// None where there is light enough.
-std::optional<StereoImages> evened_out(const StereoImages& images, const ImageQuality& left,
-                                       const ImageQuality& right) {
-  if (!is_noisy_in_the_dark(images.left, left.brightest) ||
-      !is_noisy_in_the_dark(images.right, right.brightest)) {
-    return std::nullopt;
-  }
-  StereoImages evened = images;
-  even_out_shot_noise(evened.left, left.brightest);
-  even_out_shot_noise(evened.right, right.brightest);
-  return evened;
 }
 
 // The matches of the first pairs, one pair after the other.
@@ -164,9 +143,8 @@ FrameExtractor::FrameExtractor(const CameraRig& cameras, const SlamOptions& opti
 FrameExtractor::~FrameExtractor() = default;
 
 std::vector<FeatureSet> FrameExtractor::find_features(const StereoImages& images,
-                                                      const StereoNoise& noise, StageTimes& times) {
-  const std::array pair{SiftBatch::Input{&images.left, noise.left},
-                        SiftBatch::Input{&images.right, noise.right}};
+                                                      StageTimes& times) {
+  const std::array pair{&images.left, &images.right};
   const GrayImage left_mask = both(left_mask_, images.mask);
   const auto or_null = [](const GrayImage& mask) { return mask.empty() ? nullptr : &mask; };
   if (left_mask.empty() && right_mask_.empty()) {
@@ -179,23 +157,15 @@ std::vector<FeatureSet> FrameExtractor::find_features(const StereoImages& images
   return found;
 }
 
-CameraFrame FrameExtractor::extract(const StereoImages& given, bool check_pair, StageTimes& times) {
+CameraFrame FrameExtractor::extract(const StereoImages& input, bool check_pair, StageTimes& times) {
   StageClock clock(times);
-  const std::vector quality{image_quality(given.left), image_quality(given.right)};
-  const std::optional<StereoImages> evened = evened_out(given, quality[0], quality[1]);
-  const StereoImages& input = evened ? *evened : given;
-  // Patches are compared as they are: an alignment weighs all their pixels, and where noise has
-  // been smoothed, what does not belong together looks alike.
-  std::optional<QuietPair> quiet = quietened(input, evened.has_value());
-  std::optional<StereoImages> aligned;
+  std::optional<StereoImages> quiet = quietened(input);
   if (aligner_) {
-    aligned = input;
-    aligner_->align(aligned->right);
-    if (quiet) aligner_->align(quiet->images.right);
+    if (!quiet) quiet = input;
+    aligner_->align(quiet->right);
   }
-  const StereoImages& images = aligned ? *aligned : input;
-  std::vector<FeatureSet> found =
-      quiet ? find_features(quiet->images, quiet->noise, times) : find_features(images, {}, times);
+  const StereoImages& images = quiet ? *quiet : input;
+  std::vector<FeatureSet> found = find_features(images, times);
   clock.lap("sift");
   auto left_pyramid = std::make_shared<const ImagePyramid>(images.left);
   const ImagePyramid right_pyramid(images.right);
@@ -203,8 +173,13 @@ CameraFrame FrameExtractor::extract(const StereoImages& given, bool check_pair, 
       match_stereo(std::move(found[0]), std::move(found[1]), left_pyramid.get(), &right_pyramid,
                    cameras_.stereo, options_.stereo);
   clock.lap("stereo_match");
-  FrameEvidence evidence{quality, masked_share(images.mask), std::nullopt,      0,
-                         0,       alignment_.taken_out,      alignment_.changed};
+  FrameEvidence evidence{{image_quality(input.left), image_quality(input.right)},
+                         masked_share(images.mask),
+                         std::nullopt,
+                         0,
+                         0,
+                         alignment_.taken_out,
+                         alignment_.changed};
   if (check_pair || hardly_matches(features)) {
     evidence.pair = hybrid_slam::check_pair(features.left, features.right);
   }
@@ -218,13 +193,10 @@ CameraFrame FrameExtractor::extract(const StereoImages& given, bool check_pair, 
 CameraFrame FrameExtractor::extract(const FisheyeImage& images, StageTimes& times) {
   StageClock clock(times);
   GrayImage image = images.image;
-  sift::ImageNoise noise = is_noisy(image) ? suppress_noise(image) : sift::ImageNoise{};
-  if (options_.fisheye.view.clahe > 0) {
-    enhance_contrast(image, options_.fisheye.view.clahe);
-    noise = {};  // amplified by another gain everywhere
-  }
+  suppress_noise(image);
+  if (options_.fisheye.view.clahe > 0) enhance_contrast(image, options_.fisheye.view.clahe);
   const GrayImage mask = both(fisheye_mask_, images.mask);
-  const std::array single{SiftBatch::Input{&image, noise}};
+  const std::array<const GrayImage*, 1> single{&image};
   std::vector<FeatureSet> found = find_by(*fisheye_sift_, single, &mask, "fisheye_sift", times);
   Frame frame =
       make_mono_frame(0, to_seconds(images.time), std::move(found[0]), image.width, image.height);

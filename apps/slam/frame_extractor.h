@@ -26,12 +26,6 @@ struct FirstImages {
   static constexpr std::size_t kFisheye = 3;
 };
 
-// What the images of a pair carry.
-struct StereoNoise {
-  sift::ImageNoise left;
-  sift::ImageNoise right;
-};
-
 // How right images are re-warped.
 struct SettledAlignment {
   std::shared_ptr<const PairAlignment> taken_out;  // null: nothing is
@@ -59,8 +53,7 @@ class FrameExtractor {
   bool upsamples() const { return options_.sift.upsample; }
 
  private:
-  std::vector<FeatureSet> find_features(const StereoImages& images, const StereoNoise& noise,
-                                        StageTimes& times);
+  std::vector<FeatureSet> find_features(const StereoImages& images, StageTimes& times);
 
   CameraRig cameras_;
   SlamOptions options_;

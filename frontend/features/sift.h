@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "backend/map/features.h"
-#include "frontend/features/definition/noise.h"
 #include "frontend/features/definition/parameters.h"
 #include "frontend/features/image.h"
 
@@ -51,10 +50,6 @@ class SiftExtractor {
   }
   virtual FeatureSet finish() { return extract(*started_image_, started_mask_); }
 
-  // What the images started or extracted from now on carry; at first there is nothing to speak of.
-  // Where there is, features are those that stand out of it, the clearest first.
-  void expect(const sift::ImageNoise& noise) { noise_ = noise; }
-
   // Stages of the image last extracted, in their order, and their milliseconds. Where measuring
   // makes the whole slower, there are none unless time_stages() asked for them before.
   virtual std::vector<std::pair<std::string, double>> stage_times() const { return {}; }
@@ -63,11 +58,7 @@ class SiftExtractor {
   // stages, by the device's clock: at next to no cost. Without such a device it does nothing.
   virtual void time_device(bool /*timed*/) {}
 
- protected:
-  const sift::ImageNoise& noise() const { return noise_; }
-
  private:
-  sift::ImageNoise noise_;
   const GrayImage* started_image_ = nullptr;
   const GrayImage* started_mask_ = nullptr;
 };

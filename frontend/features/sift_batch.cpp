@@ -15,15 +15,13 @@ SiftBatch::SiftBatch(SiftDevice device, const SiftOptions& options, int images)
   }
 }
 
-std::vector<FeatureSet> SiftBatch::extract(std::span<const Input> images, const GrayImage* mask) {
+std::vector<FeatureSet> SiftBatch::extract(std::span<const GrayImage* const> images,
+                                           const GrayImage* mask) {
   std::vector<FeatureSet> features;
   device_times_.clear();
   while (!images.empty()) {
     const std::size_t count = std::min(images.size(), engines_.size());
-    for (std::size_t i = 0; i < count; ++i) {
-      engines_[i]->expect(images[i].noise);
-      engines_[i]->start(*images[i].image, mask);
-    }
+    for (std::size_t i = 0; i < count; ++i) engines_[i]->start(*images[i], mask);
     for (std::size_t i = 0; i < count; ++i) {
       features.push_back(engines_[i]->finish());
       if (on_device_)

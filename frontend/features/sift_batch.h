@@ -17,14 +17,8 @@ class SiftBatch {
   // For so many images at a time; more are taken in turns. Throws as make_sift_on() does.
   SiftBatch(SiftDevice device, const SiftOptions& options, int images);
 
-  // What images are searched for features: their pixels and the noise that these carry.
-  struct Input {
-    const GrayImage* image;
-    sift::ImageNoise noise;
-  };
-
   // The features of each image, as SiftExtractor::extract() finds them. `mask` is for all of them.
-  std::vector<FeatureSet> extract(std::span<const Input> images, const GrayImage* mask);
+  std::vector<FeatureSet> extract(std::span<const GrayImage* const> images, const GrayImage* mask);
 
   // What the device did for the images last extracted, each in its turn: upload, kernels, download;
   // milliseconds by the device's clock. Side by side they take less than their sum. Empty on the

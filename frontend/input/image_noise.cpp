@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
 #include <numbers>
 
@@ -14,10 +13,7 @@ namespace {
 
 constexpr int kRowStep = 4;            // every fourth row tells as much
 constexpr double kQuiet = 4;           // [grey levels]
-constexpr double kMinSmoothing = 0.7;  // [px], below which it is not worth it
-constexpr double kDark = 64;           // [grey levels] brightest of a dark image
-constexpr double kBlack = 8;           // ... and of one with less than 3 bits to tell from noise
-constexpr double kFilled = 200;        // [grey levels] brightest after even_out_shot_noise()
+constexpr double kMinSmoothing = 0.7;  // [px]
 
 // Of absolute values of a normal distribution: median over standard deviation.
 constexpr double kMedianOfNormal = 0.6745;
@@ -61,31 +57,14 @@ double coarse_noise(const GrayImage& image) {
   return std::max(noise_at(image, 1), noise_at(image, 2));
 }
 
-bool is_noisy_in_the_dark(const GrayImage& image, double brightest) {
-  return brightest >= kBlack && brightest < kDark &&
-         smoothing_of(image_noise(image) * 255 / brightest) >= kMinSmoothing;
-}
-
-void even_out_shot_noise(GrayImage& image, double brightest) {
-  constexpr double kAnscombe = 0.375;
-  std::array<std::uint8_t, 256> table{};
-  for (std::size_t value = 0; value < table.size(); ++value) {
-    const double root =
-        std::sqrt((static_cast<double>(value) + kAnscombe) / (brightest + kAnscombe));
-    table[value] = static_cast<std::uint8_t>(std::lround(std::min(255.0, kFilled * root)));
-  }
-  for (std::uint8_t& pixel : image.pixels) pixel = table[pixel];
-}
-
 bool is_noisy(const GrayImage& image) { return smoothing_of(image_noise(image)) >= kMinSmoothing; }
 
-sift::ImageNoise suppress_noise(GrayImage& image) {
-  const double noise = coarse_noise(image);
-  const double smoothing = smoothing_of(noise);
-  if (!(smoothing > 0)) return {};
+bool suppress_noise(GrayImage& image) {
+  if (!is_noisy(image)) return false;
+  const double smoothing = smoothing_of(coarse_noise(image));
   cv::Mat pixels(image.height, image.width, CV_8UC1, image.pixels.data());
   cv::GaussianBlur(pixels.clone(), pixels, cv::Size(), smoothing);
-  return {static_cast<float>(noise), static_cast<float>(smoothing)};
+  return true;
 }
 
 }  // namespace hybrid_slam

@@ -44,7 +44,7 @@ const std::vector<sift::Extremum>& CpuSift::detect(const GrayImage& image, const
   check_sizes(image, mask);
   width_ = image.width;
   height_ = image.height;
-  extrema_ = scale_space_.detect(image, noise());
+  extrema_ = scale_space_.detect(image);
   if (mask) std::erase_if(extrema_, [&](const auto& e) { return masked(*mask, e); });
   return extrema_;
 }

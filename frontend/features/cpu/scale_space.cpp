@@ -89,9 +89,8 @@ void ScaleSpace::prepare(int width, int height) {
   }
 }
 
-const std::vector<Extremum>& ScaleSpace::detect(const GrayImage& image, const ImageNoise& noise) {
+const std::vector<Extremum>& ScaleSpace::detect(const GrayImage& image) {
   extrema_.clear();
-  noise_ = noise;
   if (std::min(image.width, image.height) < kMinOctaveSize) return extrema_;
   prepare(image.width, image.height);
   for (std::size_t octave = 0; octave < octaves_.size(); ++octave) pass(image, octave);
@@ -157,13 +156,8 @@ void ScaleSpace::search_row(const Octave& octave, int y) {
       rows[i] = octave.differences[k].row(row + i % 3 - 1) + column;
     }
   };
-  const ExtremumLimits limits{layers_,
-                              octave.height,
-                              octave.width,
-                              contrast_threshold_,
-                              edge_threshold_,
-                              static_cast<float>(initial_sigma_),
-                              noise_in_octave(noise_, std::exp2(static_cast<float>(octave.index)))};
+  const ExtremumLimits limits{layers_, octave.height, octave.width, contrast_threshold_,
+                              edge_threshold_};
   const auto layers = static_cast<std::size_t>(layers_);
   for (std::size_t k = 0; k < octave.differences.size(); ++k) {
     for (int i = 0; i < 3; ++i) {
@@ -176,7 +170,7 @@ void ScaleSpace::search_row(const Octave& octave, int y) {
     const std::size_t count =
         find_extrema(pointers_.data() + 3 * layer, smallest_[layer], largest_[layer], kBorder,
                      static_cast<std::size_t>(octave.width - kBorder),
-                     limits.sample_threshold(static_cast<int>(layer) + 1), columns_.data());
+                     kSampleContrast * contrast_threshold_, columns_.data());
     for (std::size_t i = 0; i < count; ++i) {
       RefinedExtremum refined;
       if (!refine_extremum(rows_at, limits, static_cast<int>(layer) + 1, y, columns_[i],

@@ -16,7 +16,7 @@ namespace hybrid_slam::sift {
 struct Extremum {
   float x, y;                           // in the image [px]
   float scale;                          // [px]
-  float response;                       // see RefinedExtremum
+  float response;                       // |difference of Gaussians| [grey levels]
   int octave;                           // counted from the first that there is
   int level;                            // the one that is nearest in blur
   float level_x, level_y, level_scale;  // there [samples]
@@ -32,8 +32,8 @@ class ScaleSpace {
   explicit ScaleSpace(const SiftOptions& options);
 
   // Ascending by octave, layer, row and column; none if the image is smaller than kMinOctaveSize.
-  // `noise` is what the image carries. Valid, as the levels are, until the next call.
-  const std::vector<Extremum>& detect(const GrayImage& image, const ImageNoise& noise = {});
+  // Valid, as the levels are, until the next call.
+  const std::vector<Extremum>& detect(const GrayImage& image);
 
   // A level of the image last given, `level` in 1 .. octave_layers.
   LevelView level(int octave, int level) const;
@@ -65,7 +65,6 @@ class ScaleSpace {
   int search_lag_;               // and the search for extrema
   int width_ = 0;                // of the image
   int height_ = 0;
-  ImageNoise noise_;  // likewise
   std::optional<FirstLevel> first_level_;
   std::vector<Octave> octaves_;
   std::vector<const float*> pointers_;

@@ -26,7 +26,7 @@ FeatureSet CudaSift::extract(const GrayImage& image, const GrayImage* mask) {
 }
 
 void CudaSift::start(const GrayImage& image, const GrayImage* mask) {
-  engine_->sift.start(image, mask, noise());
+  engine_->sift.start(image, mask);
 }
 
 FeatureSet CudaSift::finish() { return engine_->sift.finish(); }

@@ -29,7 +29,6 @@ struct FindExtrema {
   struct Shared {
     float differences[kMaxLayers + 2][kRows + 2][kColumns + 2];
     int count;
-    float thresholds[kMaxLayers];                          // of samples, per layer
     std::uint16_t candidates[kMaxLayers * kMostPerLayer];  // (layer - 1) * kThreads + place in tile
   };
 
@@ -37,9 +36,8 @@ struct FindExtrema {
   float initial_sigma;
   float contrast_threshold;
   float edge_threshold;
-  const sift::ImageNoise* noise;  // of the image
-  const std::uint8_t* mask;       // null: none
-  int width;                      // of the image and the mask
+  const std::uint8_t* mask;  // null: none
+  int width;                 // of the image and the mask
   int height;
   unsigned* claimed;  // a bit for each sample of each layer: an extremum has been fitted there
   Found found;
@@ -51,8 +49,7 @@ struct FindExtrema {
     const int tile = block.x - octave.first_tile;
     const int x0 = sift::kBorder + tile % octave.tiles_across * kColumns;
     const int y0 = sift::kBorder + tile / octave.tiles_across * kRows;
-    const sift::ExtremumLimits limits = limits_of(octave);
-    load(block, octave, limits, x0, y0, shared);
+    load(block, octave, x0, y0, shared);
     const int layers = scale_space.layers;
     block.each(layers * kThreads, [&](int i) {
       const int column = i % kColumns;
@@ -61,7 +58,7 @@ struct FindExtrema {
       if (y0 + row >= octave.size.height - sift::kBorder) return;
       const int layer = 1 + i / kThreads;
       const float value = shared.differences[layer][row + 1][column + 1];
-      if (!(fabsf(value) > shared.thresholds[layer - 1])) return;
+      if (!(fabsf(value) > sift::kSampleContrast * contrast_threshold)) return;
       const float* rows[9];
       for (int k = 0; k < 9; ++k) {
         rows[k] = &shared.differences[layer + k / 3 - 1][row + k % 3][column + 1];
@@ -71,30 +68,17 @@ struct FindExtrema {
     });
     block.each(shared.count, [&](int k) {
       const int i = shared.candidates[k];
-      refine(octave, limits, number, 1 + i / kThreads, y0 + i % kThreads / kColumns,
-             x0 + i % kColumns);
+      refine(octave, number, 1 + i / kThreads, y0 + i % kThreads / kColumns, x0 + i % kColumns);
     });
   }
 
  private:
-  HS_HOST_DEVICE sift::ExtremumLimits limits_of(const Octave& octave) const {
-    return {scale_space.layers,
-            octave.size.height,
-            octave.size.width,
-            contrast_threshold,
-            edge_threshold,
-            initial_sigma,
-            sift::noise_in_octave(*noise, octave.pixels)};
-  }
-
-  HS_HOST_DEVICE void load(const Block& block, const Octave& octave,
-                           const sift::ExtremumLimits& limits, int x0, int y0,
+  HS_HOST_DEVICE void load(const Block& block, const Octave& octave, int x0, int y0,
                            Shared& shared) const {
     constexpr int kWidth = kColumns + 2;
     constexpr int kSamples = kWidth * (kRows + 2);
     block.each(kSamples, [&](int i) {
       if (i == 0) shared.count = 0;
-      if (i < scale_space.layers) shared.thresholds[i] = limits.sample_threshold(i + 1);
       const int x = x0 - 1 + i % kWidth;
       const int y = y0 - 1 + i / kWidth;
       const bool inside = x < octave.size.width && y < octave.size.height;
@@ -107,8 +91,7 @@ struct FindExtrema {
     });
   }
 
-  HS_HOST_DEVICE void refine(const Octave& octave, const sift::ExtremumLimits& limits, int number,
-                             int layer, int y, int x) const {
+  HS_HOST_DEVICE void refine(const Octave& octave, int number, int layer, int y, int x) const {
     float samples[27];
     const auto rows_at = [&](int k, int row, int column, const float** rows) {
       for (int i = 0; i < 27; ++i) {
@@ -116,6 +99,8 @@ struct FindExtrema {
       }
       for (int i = 0; i < 9; ++i) rows[i] = samples + 3 * i + 1;
     };
+    const sift::ExtremumLimits limits{scale_space.layers, octave.size.height, octave.size.width,
+                                      contrast_threshold, edge_threshold};
     sift::RefinedExtremum refined;
     if (!sift::refine_extremum(rows_at, limits, layer, y, x, &refined)) return;
     const Extremum extremum = placed(octave, number, refined);

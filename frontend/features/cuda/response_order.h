@@ -11,7 +11,7 @@ namespace hybrid_slam::cuda {
 struct Extremum {
   float x, y;                           // in the image [px]
   float scale;                          // [px]
-  float response;                       // see sift::RefinedExtremum
+  float response;                       // |difference of Gaussians| [grey levels]
   float level_x, level_y, level_scale;  // in its level [samples]
   std::int16_t octave;                  // counted from the first that there is
   std::int16_t level;                   // the one that is nearest in blur

@@ -50,7 +50,7 @@ class SiftEngine {
   }
 
   // Enqueues all work for an image, which may change as soon as this returns.
-  void start(const GrayImage& image, const GrayImage* mask, const sift::ImageNoise& noise = {});
+  void start(const GrayImage& image, const GrayImage* mask);
 
   // Waits for what was started last.
   FeatureSet finish();
@@ -103,14 +103,11 @@ class SiftEngine {
   int width_ = 0;  // of the image
   int height_ = 0;
   bool masked_ = false;
-  sift::ImageNoise noise_;
   bool allocated_ = false;
   int extrema_capacity_ = 0;
 
   std::uint8_t* host_pixels_ = nullptr;  // of the image, then of the mask
   std::uint8_t* pixels_ = nullptr;
-  sift::ImageNoise* host_image_noise_ = nullptr;
-  sift::ImageNoise* image_noise_ = nullptr;
   float* weights_ = nullptr;
   float* first_level_ = nullptr;
   float* blurred_ = nullptr;  // along the rows

@@ -40,9 +40,6 @@ void SiftEngine<Backend>::allocate() {
   const std::size_t pixels = static_cast<std::size_t>(width_) * height_;
   host_pixels_ = static_cast<std::uint8_t*>(backend_.allocate_for_host(2 * pixels));
   pixels_ = take<std::uint8_t>(2 * pixels);
-  host_image_noise_ =
-      static_cast<sift::ImageNoise*>(backend_.allocate_for_host(sizeof(sift::ImageNoise)));
-  image_noise_ = take<sift::ImageNoise>(1);
   weights_ = take<float>(padded_weights_.size());
   backend_.upload_now(weights_, padded_weights_.data(), padded_weights_.size() * sizeof(float));
   allocate_scale_space();

@@ -5,14 +5,12 @@
 namespace hybrid_slam::cuda {
 
 template <typename Backend>
-void SiftEngine<Backend>::start(const GrayImage& image, const GrayImage* mask,
-                                const sift::ImageNoise& noise) {
+void SiftEngine<Backend>::start(const GrayImage& image, const GrayImage* mask) {
   check_sizes(image, mask);
   prepare(image.width, image.height, mask != nullptr);
   if (octaves_of(width_, height_) == 0) return;
   const std::size_t size = image.pixels.size();
   backend_.wait();  // for an upload from the same memory
-  noise_ = noise;
   std::memcpy(host_pixels_, image.pixels.data(), size);
   if (mask != nullptr) std::memcpy(host_pixels_ + size, mask->pixels.data(), size);
   run();
@@ -47,8 +45,6 @@ void SiftEngine<Backend>::run() {
   const std::size_t size = static_cast<std::size_t>(width_) * height_;
   backend_.begin_stage("upload");
   backend_.upload(pixels_, host_pixels_, masked_ ? 2 * size : size);
-  *host_image_noise_ = noise_;
-  backend_.upload(image_noise_, host_image_noise_, sizeof(sift::ImageNoise));
   backend_.record([&] {
     backend_.begin_stage("scale space");
     make_scale_space();
@@ -97,8 +93,8 @@ void SiftEngine<Backend>::find_extrema() {
       masked_ ? pixels_ + static_cast<std::size_t>(width_) * height_ : nullptr;
   backend_.launch({tiles_}, FindExtrema{scale_space_, static_cast<float>(options_.initial_sigma),
                                         static_cast<float>(options_.contrast_threshold),
-                                        static_cast<float>(options_.edge_threshold), image_noise_,
-                                        mask, width_, height_, claimed_, sorting_.found});
+                                        static_cast<float>(options_.edge_threshold), mask, width_,
+                                        height_, claimed_, sorting_.found});
   backend_.launch({1}, PlaceBuckets{sorting_});
   backend_.launch({kGridBlocks}, FillBuckets{sorting_});
   backend_.launch({kGridBlocks}, SortBuckets{sorting_});

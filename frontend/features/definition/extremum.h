@@ -2,9 +2,7 @@
 
 #include <cmath>
 
-#include "frontend/features/definition/noise.h"
 #include "frontend/features/definition/parameters.h"
-#include "frontend/features/definition/scale_space.h"
 
 // Extrema of the differences of Gaussians: which samples they are, where they lie between samples,
 // and which are kept.
@@ -95,24 +93,13 @@ HS_HOST_DEVICE inline PlaneFit fit_in_plane(const float* const* rows, float laye
 struct RefinedExtremum {
   int layer, y, x;             // the sample that the parabola was fitted at
   float to_layer, to_y, to_x;  // from there to the extremum [layers, samples]
-  float response;              // |difference| times response_gain() [grey levels]
+  float response;              // |difference| [grey levels]
 };
 
 struct ExtremumLimits {
   int layers, height, width;  // of the octave
   float contrast_threshold;
   float edge_threshold;
-  float initial_sigma;  // [samples]
-  ImageNoise noise;     // [samples]
-
-  HS_HOST_DEVICE float gain(float layer) const {
-    if (!(noise.deviation > 0)) return 1;
-    return response_gain(noise, level_sigma(initial_sigma, layers, layer), layers);
-  }
-  // |difference| that a sample must exceed before it is interpolated.
-  HS_HOST_DEVICE float sample_threshold(int layer) const {
-    return kSampleContrast * contrast_threshold / gain(static_cast<float>(layer));
-  }
 };
 
 // Where the extremum found at sample (layer, y, x) lies; false if it is none that is kept. While
@@ -128,7 +115,7 @@ HS_HOST_DEVICE inline bool refine_extremum(const RowsAt& rows_at, const Extremum
     const Fit fit = fit_extremum(rows, limits.edge_threshold);
     const float largest = fmaxf(fabsf(fit.layer), fmaxf(fabsf(fit.y), fabsf(fit.x)));
     if (largest <= kMaxOffset) {
-      const float response = fabsf(fit.value) * limits.gain(static_cast<float>(layer) + fit.layer);
+      const float response = fabsf(fit.value);
       if (fit.edge || response < limits.contrast_threshold) return false;
       const PlaneFit place = fit_in_plane(rows, fit.layer);
       *refined = {layer, y, x, fit.layer, place.y, place.x, response};

@@ -36,7 +36,6 @@ constexpr double kKernelSigmas = 3.0;  // a kernel reaches so many standard devi
 
 // Extrema.
 constexpr double kContrastThreshold = 1.2;  // smallest |difference| [grey levels]
-constexpr float kNoiseDeviations = 4;       // the same where noise is known; see docs/sift.md
 constexpr double kEdgeThreshold = 10;       // largest ratio of principal curvatures
 constexpr float kSampleContrast = 0.5F;  // of the threshold, which a sample must exceed before it
                                          // is interpolated

@@ -14,7 +14,7 @@ class HostCudaSift final : public SiftExtractor {
       : engine_(options, backward) {}
 
   FeatureSet extract(const GrayImage& image, const GrayImage* mask) override {
-    engine_.start(image, mask, noise());
+    engine_.start(image, mask);
     return engine_.finish();
   }
   cuda::SiftEngine<cuda::OnHost>& engine() { return engine_; }

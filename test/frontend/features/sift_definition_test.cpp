@@ -12,7 +12,6 @@
 
 #include "frontend/features/definition/descriptor.h"
 #include "frontend/features/definition/extremum.h"
-#include "frontend/features/definition/noise.h"
 #include "frontend/features/definition/orientation.h"
 #include "frontend/features/definition/scale_space.h"
 
@@ -174,7 +173,7 @@ TEST_CASE("A saddle is an edge, a plane has no extremum") {
     std::copy(n.rows.begin(), n.rows.end(), rows);
   };
   RefinedExtremum refined;
-  CHECK_FALSE(refine_extremum(rows_at, {3, 100, 100, 0, 10, 1.6F, {}}, 2, 50, 50, &refined));
+  CHECK_FALSE(refine_extremum(rows_at, {3, 100, 100, 0, 10}, 2, 50, 50, &refined));
 }
 
 // Differences that are one parabola, with its extremum at (layer, y, x).
@@ -194,74 +193,8 @@ struct Paraboloid {
   }
 };
 
-// A square image, blurred along both axes as if it went on periodically.
-std::vector<double> blurred(const std::vector<double>& image, int size, double sigma) {
-  std::vector<float> weights(static_cast<std::size_t>(kernel_size(sigma, KernelCentre::kSample)));
-  make_kernel(sigma, KernelCentre::kSample, weights.data());
-  const int reach = static_cast<int>(weights.size() / 2);
-  const auto along = [&](const std::vector<double>& in, int step, int across) {
-    std::vector<double> out(in.size());
-    for (int line = 0; line < size; ++line) {
-      for (int i = 0; i < size; ++i) {
-        double sum = 0;
-        for (int k = -reach; k <= reach; ++k) {
-          const int from = (i + k + size) % size;
-          sum += static_cast<double>(weights[static_cast<std::size_t>(k + reach)]) *
-                 in[static_cast<std::size_t>(line * across + from * step)];
-        }
-        out[static_cast<std::size_t>(line * across + i * step)] = sum;
-      }
-    }
-    return out;
-  };
-  return along(along(image, 1, size), size, 1);
-}
-
-TEST_CASE("What noise leaves in a difference of Gaussians is what it is measured to leave") {
-  constexpr int kSize = 400;
-  std::mt19937 random(5);
-  std::normal_distribution<double> normal(0, 25);
-  std::vector<double> image(kSize * kSize);
-  for (double& pixel : image) pixel = normal(random);
-  const double step = std::sqrt(std::exp2(2.0 / kLayers) - 1);
-  for (const double smoothing : {0.0, 1.76}) {
-    const std::vector<double> smooth = smoothing > 0 ? blurred(image, kSize, smoothing) : image;
-    for (const double scale : {1.6, 2.5, 5.0}) {
-      const std::vector<double> lower = blurred(smooth, kSize, scale);
-      const std::vector<double> upper = blurred(lower, kSize, scale * step);
-      double squares = 0;
-      for (std::size_t i = 0; i < lower.size(); ++i) {
-        squares += (upper[i] - lower[i]) * (upper[i] - lower[i]);
-      }
-      const double measured = std::sqrt(squares / static_cast<double>(lower.size()));
-      const ImageNoise noise{25, static_cast<float>(smoothing)};
-      INFO("smoothing " << smoothing << ", scale " << scale);
-      CHECK(difference_noise(noise, static_cast<float>(scale), kLayers) ==
-            Approx(measured).epsilon(0.05));
-      // The same in an octave of half the resolution.
-      CHECK(difference_noise(noise_in_octave(noise, 2), static_cast<float>(scale / 2), kLayers) ==
-            Approx(measured).epsilon(0.05));
-    }
-  }
-}
-
-TEST_CASE("Where noise is known, it sets what an extremum must exceed") {
-  const ImageNoise noise{10, 1};
-  const ExtremumLimits limits{3, 40, 50, static_cast<float>(kContrastThreshold), 10, 1.6F, noise};
-  const float scale = level_sigma(1.6F, 3, 1.8F);
-  const float least = kNoiseDeviations * difference_noise(noise, scale, 3);
-  RefinedExtremum refined;
-  const auto kept = [&](float peak) {
-    return refine_extremum(Paraboloid{1.8, 20.3, 30.3, peak}, limits, 2, 20, 30, &refined);
-  };
-  CHECK_FALSE(kept(0.98F * least));
-  REQUIRE(kept(2 * least));
-  CHECK(refined.response == Approx(2 * kContrastThreshold).epsilon(1e-3));
-  CHECK(limits.sample_threshold(2) < least);
-}
-
 TEST_CASE("An extremum is followed to the sample that is nearest, but not far and not out") {
-  const ExtremumLimits limits{3, 40, 50, 1.2F, 10, 1.6F, {}};
+  const ExtremumLimits limits{3, 40, 50, 1.2F, 10};
   RefinedExtremum refined;
   CHECK(refine_extremum(Paraboloid{1.8, 20.3, 30.3, 5}, limits, 1, 19, 31, &refined));
   CHECK(refined.layer == 2);

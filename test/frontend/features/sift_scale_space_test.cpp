@@ -262,13 +262,8 @@ std::vector<RefinedExtremum> extrema_of(const std::vector<Image>& levels,
     }
   };
   const auto threshold = static_cast<float>(options.contrast_threshold);
-  const ExtremumLimits limits{options.octave_layers,
-                              first.height,
-                              first.width,
-                              threshold,
-                              static_cast<float>(options.edge_threshold),
-                              static_cast<float>(options.initial_sigma),
-                              {}};
+  const ExtremumLimits limits{options.octave_layers, first.height, first.width, threshold,
+                              static_cast<float>(options.edge_threshold)};
   std::vector<RefinedExtremum> extrema;
   for (int layer = 1; layer <= options.octave_layers; ++layer) {
     for (int y = kBorder; y < first.height - kBorder; ++y) {
