@@ -16,8 +16,21 @@ using Samples = Eigen::VectorXf;
 
 // What the target's grey values are made of, each without its mean over the patch: the derivatives
 // by a shift of the patch, per pixel of the level; the values themselves (gain); the values times x
-// and times y (a gain that changes across the patch); x and y (a veil that does).
-enum Column { kShiftX, kShiftY, kGain, kGainX, kGainY, kVeilX, kVeilY, kColumns };
+// and times y (a gain that changes across the patch); x and y (a veil that does). Along the row
+// alone there is no shift along y; instead, the derivative by a shift along x is there times x and
+// times y, too (a disparity that changes across the patch).
+enum Column {
+  kShiftX,
+  kShiftY,
+  kGain,
+  kGainX,
+  kGainY,
+  kVeilX,
+  kVeilY,
+  kDisparityY,
+  kColumns,
+  kDisparityX = kShiftY,
+};
 using Columns = Eigen::Matrix<float, Eigen::Dynamic, kColumns>;
 using Normal = SummedProducts;
 static_assert(kColumns == kSummedColumns);
@@ -78,15 +91,12 @@ bool has_place(const Normal& inverse, Eigen::Index samples, bool horizontal_only
 // Three numbers are sought, each the scalar product of the target with a patch of weights.
 void find_weights(const Columns& columns, Normal normal, bool horizontal_only,
                   ReferencePatch* patch) {
-  if (horizontal_only) hold(kShiftY, &normal);
+  if (!horizontal_only) hold(kDisparityY, &normal);
   Normal inverse = normal.inverse();
   patch->usable = inverse.allFinite() && has_place(inverse, columns.rows(), horizontal_only);
   if (!patch->usable) return;
-  if (horizontal_only) {
-    inverse.row(kShiftY).setZero();
-    inverse.col(kShiftY).setZero();
-  }
   patch->weights.noalias() = columns * inverse.leftCols<3>().cast<float>();
+  if (horizontal_only) patch->weights.col(kShiftY).setZero();
 }
 
 // How well the target's samples fit gain * values.
@@ -100,7 +110,7 @@ void judge(const ReferencePatch& patch, const Samples& target, Alignment* result
 }
 
 // From samples with a rim of one pixel.
-Columns columns_of(const Samples& samples, int half) {
+Columns columns_of(const Samples& samples, int half, bool horizontal_only) {
   const int side = 2 * half + 3;
   Columns columns((side - 2) * (side - 2), kColumns);
   Eigen::Index i = 0;
@@ -115,10 +125,18 @@ Columns columns_of(const Samples& samples, int half) {
     }
   }
   remove_mean(columns.col(kGain));
-  const auto gain = columns.col(kGain).array();
-  columns.col(kGainX) = gain * columns.col(kVeilX).array();
-  columns.col(kGainY) = gain * columns.col(kVeilY).array();
-  for (const auto k : {kShiftX, kShiftY, kGainX, kGainY}) remove_mean(columns.col(k));
+  const auto x = columns.col(kVeilX).array();
+  const auto y = columns.col(kVeilY).array();
+  columns.col(kGainX) = columns.col(kGain).array() * x;
+  columns.col(kGainY) = columns.col(kGain).array() * y;
+  columns.col(kDisparityY).setZero();
+  if (horizontal_only) {
+    columns.col(kDisparityX) = columns.col(kShiftX).array() * x;
+    columns.col(kDisparityY) = columns.col(kShiftX).array() * y;
+  }
+  for (const auto k : {kShiftX, kShiftY, kGainX, kGainY, kDisparityY}) {
+    remove_mean(columns.col(k));
+  }
   return columns;
 }
 
@@ -148,10 +166,11 @@ std::optional<ReferencePatch> make_reference_patch(const ImagePyramid& image, do
   Samples samples(samples_of(half + 1));
   sample_square(level, cx, cy, half + 1,
                 samples.data());  // one more all around for the derivatives
-  const Columns columns = columns_of(samples, half);
+  const Columns columns = columns_of(samples, half, options.horizontal_only);
   const Normal normal = sums_of_products(columns.data(), static_cast<std::size_t>(columns.rows()));
+  const double along_y = options.horizontal_only ? 0 : normal(kShiftY, kShiftY);
   const double least = kMinGradientEnergy * static_cast<double>(columns.rows());
-  if (normal(kShiftX, kShiftX) + normal(kShiftY, kShiftY) < least) return std::nullopt;
+  if (normal(kShiftX, kShiftX) + along_y < least) return std::nullopt;
   find_weights(columns, normal, options.horizontal_only, &patch);
   patch.values = columns.col(kGain);
   patch.energy = normal(kGain, kGain);

@@ -49,7 +49,9 @@ struct Alignment {
 // Finds the place in `target` that looks like the patch: inverse compositional Lucas-Kanade (Baker
 // and Matthews 2004) over the position with gain and bias and their slopes, which are linear and so
 // part of every step. Lamps on the vehicle and the veil of scattered light move along with the
-// camera: without slopes they hold the patches back, and every motion comes out too short.
+// camera: without slopes they hold the patches back, and every motion comes out too short. Along
+// the row alone the disparity's slopes are estimated in the same way: ground that slants has
+// another disparity at each sample, of which texture that lies to one side shows its own.
 // `target_from_reference`: how offsets from the centre map between the images, fixed. `start`:
 // within about a pixel of the patch's level. Deterministic.
 Alignment align_patch(const ReferencePatch& patch, const ImagePyramid& target,

@@ -188,11 +188,9 @@ void warped(const Level& level, const Eigen::Vector2d& centre, const Eigen::Matr
   }
 }
 
-// Rows of the columns side by side, with a zero behind them.
-constexpr std::size_t kRow = 8;
-constexpr std::size_t kTurns = 4;   // columns whose sums with columns 4 and 5 are made by turns
+// Rows of the columns side by side.
+constexpr std::size_t kRow = kSummedColumns;
 constexpr std::size_t kChunk = 64;  // rows at a time: they stay in the first-level cache
-constexpr std::size_t kWhole = 8;   // made by turns are the sums of as many times so many rows
 
 // Eight sums, or vectors of them. Products are exact, as those of two numbers of single precision
 // are in double: it is all the same whether a machine fuses them with the addition.
@@ -222,7 +220,6 @@ HWY_INLINE hn::Vec<Doubles> plus(hn::Vec<Doubles> sum, double a, hn::Vec<Doubles
   return hn::MulAdd(hn::Set(Doubles(), a), b, sum);
 }
 
-// Row by row.
 HWY_INLINE void add_products(const double* HWY_RESTRICT rows, std::size_t count, std::size_t column,
                              double* HWY_RESTRICT sums) {
   Sums s = load(sums + column);
@@ -235,54 +232,26 @@ HWY_INLINE void add_products(const double* HWY_RESTRICT rows, std::size_t count,
     s.s4 = plus(s.s4, row[4], v);
     s.s5 = plus(s.s5, row[5], v);
     s.s6 = plus(s.s6, row[6], v);
-  }
-  store(s, sums + column);
-}
-
-// The same of an even number of rows, but with columns 4 and 5 even rows and odd rows have sums of
-// their own: the fourth and fifth, the sixth and seventh.
-HWY_INLINE void add_by_turns(const double* HWY_RESTRICT rows, std::size_t count, std::size_t column,
-                             double* HWY_RESTRICT sums) {
-  Sums s = load(sums + column);
-  for (const double* row = rows; row != rows + count * kRow; row += 2 * kRow) {
-    const double* const odd = row + kRow;
-    const auto v = hn::LoadU(Doubles(), row + column);
-    const auto w = hn::LoadU(Doubles(), odd + column);
-    s.s0 = plus(plus(s.s0, row[0], v), odd[0], w);
-    s.s1 = plus(plus(s.s1, row[1], v), odd[1], w);
-    s.s2 = plus(plus(s.s2, row[2], v), odd[2], w);
-    s.s3 = plus(plus(s.s3, row[3], v), odd[3], w);
-    s.s4 = plus(s.s4, row[4], v);
-    s.s5 = plus(s.s5, row[5], v);
-    s.s6 = plus(s.s6, odd[4], w);
-    s.s7 = plus(s.s7, odd[5], w);
+    s.s7 = plus(s.s7, row[7], v);
   }
   store(s, sums + column);
 }
 
 HWY_INLINE void to_rows(const float* HWY_RESTRICT columns, std::size_t stride, std::size_t count,
                         double* HWY_RESTRICT rows) {
-  for (std::size_t j = 0; j < kSummedColumns; ++j) {
+  for (std::size_t j = 0; j < kRow; ++j) {
     for (std::size_t i = 0; i < count; ++i) rows[i * kRow + j] = columns[j * stride + i];
   }
 }
 
 void products(const float* columns, std::size_t count, double* HWY_RESTRICT sums) {
   const std::size_t lanes = hn::Lanes(Doubles());
-  HWY_ALIGN double rows[kChunk * kRow] = {};
-  const std::size_t whole = count / kWhole * kWhole;
-  for (std::size_t first = 0; first < whole; first += kChunk) {
-    const std::size_t size = std::min(kChunk, whole - first);
+  HWY_ALIGN double rows[kChunk * kRow];
+  for (std::size_t first = 0; first < count; first += kChunk) {
+    const std::size_t size = std::min(kChunk, count - first);
     to_rows(columns + first, count, size, rows);
-    for (std::size_t j = 0; j < kTurns; j += lanes) add_by_turns(rows, size, j, sums);
-    for (std::size_t j = kTurns; j < kRow; j += lanes) add_products(rows, size, j, sums);
+    for (std::size_t j = 0; j < kRow; j += lanes) add_products(rows, size, j, sums);
   }
-  for (std::size_t j = 0; j < kTurns; ++j) {
-    sums[4 * kRow + j] += sums[6 * kRow + j];
-    sums[5 * kRow + j] += sums[7 * kRow + j];
-  }
-  to_rows(columns + whole, count, count - whole, rows);
-  for (std::size_t j = 0; j < kRow; j += lanes) add_products(rows, count - whole, j, sums);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -307,17 +276,9 @@ void sample_warped(const ImagePyramid::Level& level, const Eigen::Vector2d& cent
 }
 
 SummedProducts sums_of_products(const float* columns, std::size_t rows) {
-  constexpr int kRow = kSummedColumns + 1;
-  alignas(64) double sums[kRow * kRow] = {};
-  HWY_DYNAMIC_DISPATCH(products)(columns, rows, sums);
-  SummedProducts result;
-  for (int i = 0; i < kSummedColumns; ++i) {
-    for (int j = 0; j < kSummedColumns; ++j) {
-      const bool mirrored = i == kSummedColumns - 1 && j < i;
-      result(i, j) = mirrored ? sums[j * kRow + i] : sums[i * kRow + j];
-    }
-  }
-  return result;
+  SummedProducts sums = SummedProducts::Zero();
+  HWY_DYNAMIC_DISPATCH(products)(columns, rows, sums.data());
+  return sums;
 }
 
 }  // namespace hybrid_slam

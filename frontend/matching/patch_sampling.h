@@ -23,9 +23,8 @@ void sample_warped(const ImagePyramid::Level& level, const Eigen::Vector2d& cent
                    const Eigen::Matrix2d& warp, int half_size, float* samples);
 
 // Sums of the products of each two of so many columns that follow one another in memory: all in
-// double, since differences between them will count. To the last bit those of Eigen's product of
-// the transposed matrix with the matrix.
-constexpr int kSummedColumns = 7;
+// double, row by row, since differences between them will count.
+constexpr int kSummedColumns = 8;
 using SummedProducts = Eigen::Matrix<double, kSummedColumns, kSummedColumns>;
 SummedProducts sums_of_products(const float* columns, std::size_t rows);
 

@@ -26,7 +26,7 @@ struct Errors {
 // `start_error` in x and y.
 Errors align_all(const Eigen::Matrix2d& target_from_reference, double gain, double bias,
                  double noise, const AlignmentOptions& options, double start_error = 0.8,
-                 double scale = 2) {
+                 double scale = 2, bool map_is_known = true) {
   std::mt19937_64 random(11);
   const BlobTexture texture(kWidth, kHeight, random);
   const Eigen::Vector2d centre(kWidth / 2.0, kHeight / 2.0);
@@ -47,7 +47,9 @@ Errors align_all(const Eigen::Matrix2d& target_from_reference, double gain, doub
     const Eigen::Vector2d truth = target_from_reference * (place - centre) + centre + shift;
     Eigen::Vector2d start = truth + start_error * Eigen::Vector2d(symmetric(), symmetric());
     if (options.horizontal_only) start.y() = truth.y();
-    const Alignment found = align_patch(*patch, target, target_from_reference, start, options);
+    const Eigen::Matrix2d known =
+        map_is_known ? target_from_reference : Eigen::Matrix2d::Identity();
+    const Alignment found = align_patch(*patch, target, known, start, options);
     ++errors.tried;
     if (!found.converged) continue;
     ++errors.converged;
@@ -121,6 +123,23 @@ TEST_CASE("Alignment along the row leaves the row alone") {
   CHECK(errors.converged >= 0.99 * errors.tried);
   CHECK(errors.mean < 0.01);
   CHECK(errors.bias.y() == 0);
+}
+
+// Ground that slants by about 40 degrees, seen from ten baselines. Without slopes of the disparity
+// the mean error is 0.09 to 0.16 px.
+TEST_CASE("Alignment along the row does not mind a disparity that changes across the patch") {
+  AlignmentOptions options;
+  options.half_size = 5;
+  options.horizontal_only = true;
+  for (const Eigen::Vector2d& slope :
+       {Eigen::Vector2d(0.08, 0), Eigen::Vector2d(-0.08, 0), Eigen::Vector2d(0, 0.1)}) {
+    Eigen::Matrix2d slanted = Eigen::Matrix2d::Identity();
+    slanted.row(0) += slope.transpose();
+    const Errors errors = align_all(slanted, 1, 0, 0, options, 0.8, 2, false);
+    INFO("slope " << slope.transpose() << ", mean " << errors.mean);
+    CHECK(errors.converged >= 0.98 * errors.tried);
+    CHECK(errors.mean < 0.025);
+  }
 }
 
 TEST_CASE("Alignment says where it failed") {
