@@ -7,6 +7,7 @@
 #include "frontend/features/cpu/first_level.h"
 #include "frontend/features/cpu/row_kernels.h"
 #include "frontend/features/cpu/row_store.h"
+#include "frontend/features/definition/patch.h"
 #include "frontend/features/definition/scale_space.h"
 
 namespace hybrid_slam {

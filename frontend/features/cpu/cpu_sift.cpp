@@ -118,7 +118,7 @@ void CpuSift::prefetch(const sift::Extremum& extremum, float reach) const {
   sift::prefetch_patch(level_of(extremum), place_in_level(extremum), reach);
 }
 
-sift::LevelView CpuSift::level_of(const sift::Extremum& extremum) const {
+sift::FixedLevel CpuSift::level_of(const sift::Extremum& extremum) const {
   return scale_space_.level(extremum.octave, extremum.level);
 }
 

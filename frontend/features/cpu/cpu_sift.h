@@ -41,7 +41,7 @@ class CpuSift final : public SiftExtractor {
 
  private:
   Keypoint keypoint_of(const sift::Extremum& extremum) const;
-  sift::LevelView level_of(const sift::Extremum& extremum) const;
+  sift::FixedLevel level_of(const sift::Extremum& extremum) const;
   void prefetch(const sift::Extremum& extremum, float reach) const;
 
   SiftOptions options_;

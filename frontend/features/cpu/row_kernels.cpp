@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "frontend/features/definition/extremum.h"
+#include "frontend/features/definition/patch.h"
 
 // Compiled once per instruction set; the best one that the machine has is chosen at run time.
 #undef HWY_TARGET_INCLUDE

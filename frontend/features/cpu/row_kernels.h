@@ -35,11 +35,8 @@ void symmetric_sum_and_difference(const float* row, std::size_t count, const flo
 // out[x] = in[x].
 void to_floats(const std::uint8_t* in, std::size_t width, float* out);
 
-// Grey levels in 16 bits: 256 to a grey level. They are rounded by 0.001 grey levels, far below the
-// noise of any image.
-inline constexpr float kLevelUnits = 256;
-
-// out[x] = in[x] * kLevelUnits, rounded, for values of 0 to 255. Writes `width` samples, no more.
+// out[x] = in[x] * kLevelUnits (definition/patch.h), rounded, for values of 0 to 255. Writes
+// `width` samples, no more.
 void to_fixed_point(const float* in, std::size_t width, std::uint16_t* out);
 
 // out[x] = in[x] / kLevelUnits. Reads `width` samples, no more.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include <hwy/aligned_allocator.h>
 
@@ -9,12 +10,13 @@
 namespace hybrid_slam::sift {
 
 // The rows of an image, or the last `capacity` of them: row y takes the place of row y - capacity.
-class RowStore {
+template <typename Sample>
+class RowStoreOf {
  public:
-  RowStore(int width, int capacity);
+  RowStoreOf(int width, int capacity);
 
-  float* row(int y) { return samples_.get() + static_cast<std::size_t>(y % capacity_) * stride_; }
-  const float* row(int y) const {
+  Sample* row(int y) { return samples_.get() + static_cast<std::size_t>(y % capacity_) * stride_; }
+  const Sample* row(int y) const {
     return samples_.get() + static_cast<std::size_t>(y % capacity_) * stride_;
   }
   std::size_t stride() const { return stride_; }
@@ -22,8 +24,11 @@ class RowStore {
  private:
   int capacity_;
   std::size_t stride_;
-  hwy::AlignedFreeUniquePtr<float[]> samples_;
+  hwy::AlignedFreeUniquePtr<Sample[]> samples_;
 };
+
+using RowStore = RowStoreOf<float>;
+using FixedRowStore = RowStoreOf<std::uint16_t>;
 
 // One row with room at both ends for what a kernel reads beyond it.
 class PaddedRow {

@@ -49,7 +49,7 @@ ScaleSpace::ScaleSpace(const SiftOptions& options)
 ScaleSpace::Octave ScaleSpace::make_octave(int index) const {
   const int width = octave_size(width_, index);
   const int height = octave_size(height_, index);
-  Octave octave{index, width, height, {}, {}, {}};
+  Octave octave{index, width, height, {}, {}, {}, {}};
   const int levels = layers_ + 3;
   for (int k = 0; k < levels; ++k) {
     const bool from_image = k == 0 && index == (upsample_ ? -1 : 0);
@@ -58,8 +58,9 @@ ScaleSpace::Octave ScaleSpace::make_octave(int index) const {
       const auto above = static_cast<std::size_t>(k + 1);
       rows += lags_[above] - lags_[above - 1] + kernels_[above - 1].reach();
     }
-    const bool whole = k == 0 ? !from_image : k <= layers_;
-    octave.levels.emplace_back(width, whole ? height : std::min(rows, height));
+    const bool all = k == 0 && !from_image;
+    octave.levels.emplace_back(width, all ? height : std::min(rows, height));
+    if (k >= 1 && k <= layers_) octave.whole.emplace_back(width, height);
   }
   for (std::size_t k = 1; k < octave.levels.size(); ++k) {
     const int rows = search_lag_ - lags_[k] + kSearchReach + kBlock;
@@ -97,9 +98,9 @@ const std::vector<Extremum>& ScaleSpace::detect(const GrayImage& image) {
   return extrema_;
 }
 
-LevelView ScaleSpace::level(int octave, int level) const {
+FixedLevel ScaleSpace::level(int octave, int level) const {
   const Octave& of = octaves_.at(static_cast<std::size_t>(octave));
-  const RowStore& rows = of.levels.at(static_cast<std::size_t>(level));
+  const FixedRowStore& rows = of.whole.at(static_cast<std::size_t>(level - 1));
   return {rows.row(0), static_cast<long>(rows.stride()), of.width, of.height};
 }
 
@@ -146,6 +147,8 @@ void ScaleSpace::make_level_rows(Octave& octave, std::size_t level, int y, int c
     symmetric_sum_and_difference(along_columns.samples() - kernel.reach(), kernel.weights.size(),
                                  kernel.weights.data(), width, octave.levels[level].row(row),
                                  below.row(row), octave.differences[level - 1].row(row));
+    if (level > octave.whole.size()) continue;
+    to_fixed_point(octave.levels[level].row(row), width, octave.whole[level - 1].row(row));
   }
 }
 

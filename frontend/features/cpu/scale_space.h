@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "frontend/features/cpu/first_level.h"
+#include "frontend/features/cpu/fixed_level.h"
 #include "frontend/features/cpu/row_store.h"
 #include "frontend/features/definition/extremum.h"
-#include "frontend/features/definition/patch.h"
 #include "frontend/features/image.h"
 #include "frontend/features/sift.h"
 
@@ -25,8 +25,8 @@ struct Extremum {
 // The Gaussian scale space of an image and the extrema of its differences. An octave is made in one
 // pass over its rows, a block of them at a time: each level follows the one below it as soon as
 // that has the rows that its kernel needs, and the differences of the last few rows are searched at
-// once. Only the levels that features are described in are kept whole. Buffers are allocated when
-// the size of the image changes.
+// once. Only the levels that features are described in are kept whole, in 16 bits. Buffers are
+// allocated when the size of the image changes.
 class ScaleSpace {
  public:
   explicit ScaleSpace(const SiftOptions& options);
@@ -36,7 +36,7 @@ class ScaleSpace {
   const std::vector<Extremum>& detect(const GrayImage& image);
 
   // A level of the image last given, `level` in 1 .. octave_layers.
-  LevelView level(int octave, int level) const;
+  FixedLevel level(int octave, int level) const;
 
  private:
   struct Octave {
@@ -44,6 +44,7 @@ class ScaleSpace {
     int width;   // [samples]
     int height;  // [samples]
     std::vector<RowStore> levels;
+    std::vector<FixedRowStore> whole;  // levels 1 .. layers, in 16 bits
     std::vector<RowStore> differences;
     std::vector<PaddedRow> blurred;  // a block, along the columns but not yet along the rows
   };

@@ -6,16 +6,24 @@
 
 // Reading a level of the scale space on a grid around a feature, and the gradients of such a grid.
 // A level's blur is 1.8 samples at least, so that reading it between samples, linearly, loses
-// nothing, and steps of 0.75 scales are as good as all samples.
+// nothing, and steps of 0.75 scales are as good as all samples. Samples are whole numbers of 16
+// bits here, so that an engine can keep the levels in half the memory of floats: they are rounded
+// by 0.001 grey levels, far below the noise of any image.
 
 namespace hybrid_slam::sift {
 
-struct LevelView {
-  const float* samples;  // of the first row
-  long stride;           // samples from a row to the next
+constexpr float kLevelUnits = 256;  // per grey level: what is read from a level is in these
+
+// A level in grey levels, or, of integers, in units.
+template <typename Sample>
+struct LevelOf {
+  const Sample* samples;  // of the first row
+  long stride;            // samples from a row to the next
   int width;
   int height;
 };
+
+using LevelView = LevelOf<float>;
 
 // Where a grid lies in a level: its middle and the step along its columns, in samples; a step along
 // its rows is the same, turned by 90 degrees from +x to +y.
@@ -28,8 +36,12 @@ HS_HOST_DEVICE inline PatchFrame patch_frame(float x, float y, float step, float
   return {x, y, step * cosf(angle), step * sinf(angle)};
 }
 
+HS_HOST_DEVICE inline float units_of(float sample) { return rintf(sample * kLevelUnits); }
+HS_HOST_DEVICE inline float units_of(unsigned short sample) { return sample; }
+
 // Linear interpolation; beyond the image's sides the nearest place on them.
-HS_HOST_DEVICE inline float read_level(const LevelView& level, float x, float y) {
+template <typename Sample>
+HS_HOST_DEVICE inline float read_level(const LevelOf<Sample>& level, float x, float y) {
   x = fminf(fmaxf(x, 0.0F), static_cast<float>(level.width - 1));
   y = fminf(fmaxf(y, 0.0F), static_cast<float>(level.height - 1));
   int column = static_cast<int>(x);
@@ -38,15 +50,18 @@ HS_HOST_DEVICE inline float read_level(const LevelView& level, float x, float y)
   if (row > level.height - 2) row = level.height - 2;
   const float fx = x - static_cast<float>(column);
   const float fy = y - static_cast<float>(row);
-  const float* above = level.samples + row * level.stride + column;
-  const float* below = above + level.stride;
-  const float upper = above[0] + fx * (above[1] - above[0]);
-  const float lower = below[0] + fx * (below[1] - below[0]);
+  const Sample* above = level.samples + row * level.stride + column;
+  const Sample* below = above + level.stride;
+  const float left = units_of(above[0]);
+  const float lower_left = units_of(below[0]);
+  const float upper = left + fx * (units_of(above[1]) - left);
+  const float lower = lower_left + fx * (units_of(below[1]) - lower_left);
   return upper + fy * (lower - upper);
 }
 
 // The level at (column, row) of the grid, counted from its middle.
-HS_HOST_DEVICE inline float read_patch(const LevelView& level, const PatchFrame& frame,
+template <typename Sample>
+HS_HOST_DEVICE inline float read_patch(const LevelOf<Sample>& level, const PatchFrame& frame,
                                        float column, float row) {
   return read_level(level, frame.x + column * frame.step_x - row * frame.step_y,
                     frame.y + column * frame.step_y + row * frame.step_x);
@@ -75,7 +90,7 @@ HS_HOST_DEVICE inline float turn_of(float x, float y) {
 }
 
 struct Gradient {
-  float magnitude;  // of the difference over two grid steps [grey levels]
+  float magnitude;  // of the difference over two grid steps
   float turn;       // its angle against the grid's columns, 0 .. 1
 };
 

@@ -227,11 +227,11 @@ TEST_CASE("A level is read linearly between samples and held at its sides") {
     for (int x = 0; x < width; ++x) samples.push_back(static_cast<float>(2 * x - 3 * y + x * y));
   }
   const LevelView level{samples.data(), width, width, height};
-  const auto value = [](double x, double y) { return 2 * x - 3 * y + x * y; };
+  const auto value = [](double x, double y) { return kLevelUnits * (2 * x - 3 * y + x * y); };
   for (const double y : {0.0, 0.3, 2.9, 4.0}) {
     for (const double x : {0.0, 0.25, 5.5, 6.0}) {
       CHECK(read_level(level, static_cast<float>(x), static_cast<float>(y)) ==
-            Approx(value(x, y)).margin(1e-5));
+            Approx(value(x, y)).margin(1e-5 * kLevelUnits));
     }
   }
   CHECK(read_level(level, -3, 2.5F) == Approx(value(0, 2.5)));
@@ -240,8 +240,10 @@ TEST_CASE("A level is read linearly between samples and held at its sides") {
   CHECK(read_level(level, 1.5F, 99) == Approx(value(1.5, 4)));
   // Columns of the grid along the angle, rows turned from +x to +y.
   const PatchFrame frame = patch_frame(3, 2, 0.5F, static_cast<float>(kTurn / 4));
-  CHECK(read_patch(level, frame, 1, 0) == Approx(value(3, 2.5)).margin(1e-5));
-  CHECK(read_patch(level, frame, 0, 1) == Approx(value(2.5, 2)).margin(1e-5));
+  CHECK(read_patch(level, frame, 1, 0) == Approx(value(3, 2.5)).margin(1e-5 * kLevelUnits));
+  CHECK(read_patch(level, frame, 0, 1) == Approx(value(2.5, 2)).margin(1e-5 * kLevelUnits));
+  samples[width + 1] += 0.6F / kLevelUnits;  // rounded
+  CHECK(read_level(level, 1, 1) == value(1, 1) + 1);
 }
 
 TEST_CASE("Angles are those of atan2") {

@@ -6,10 +6,12 @@
 #include <cstdlib>
 #include <numbers>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <catch2/catch.hpp>
 #include "frontend/features/cpu/patch_kernels.h"
+#include "frontend/features/cpu/row_kernels.h"
 #include "frontend/features/definition/descriptor.h"
 #include "frontend/features/definition/orientation.h"
 #include "test/frontend/features/on_every_target.h"
@@ -21,16 +23,27 @@ namespace {
 constexpr int kWidth = 131;
 constexpr int kHeight = 97;
 
+// The same samples as the definition reads them and as the engine stores them.
 struct Level {
   std::vector<float> samples;
+  std::vector<std::uint16_t> stored;
   LevelView view;
+  FixedLevel fixed;
 
-  Level() {
-    const GrayImage image = texture(kWidth, kHeight, 12);
-    samples.assign(image.pixels.begin(), image.pixels.end());
-    view = {samples.data(), kWidth, kWidth, kHeight};
+  Level(std::vector<float> greys, int width) : samples(std::move(greys)) {
+    for (const float grey : samples) {
+      stored.push_back(static_cast<std::uint16_t>(std::lround(grey * kLevelUnits)));
+    }
+    const auto height = static_cast<int>(samples.size()) / width;
+    view = {samples.data(), width, width, height};
+    fixed = {stored.data(), width, width, height};
   }
 };
+
+Level textured_level() {
+  const GrayImage image = texture(kWidth, kHeight, 12);
+  return {std::vector<float>(image.pixels.begin(), image.pixels.end()), kWidth};
+}
 
 Gradient gradient_at(const LevelView& level, const PatchFrame& frame, float column, float row) {
   return gradient(
@@ -102,13 +115,13 @@ std::vector<PlaceInLevel> places() {
 }
 
 TEST_CASE("SIFT's angles are those of the definition") {
-  const Level level;
+  const Level level = textured_level();
   on_every_target([&] {
     int several = 0, different = 0;
     for (const PlaceInLevel& place : places()) {
       const std::vector<float> expected = angles_by_definition(level.view, place);
       std::array<float, kMaxOrientations> angles;
-      const auto count = static_cast<std::size_t>(find_angles(level.view, place, angles.data()));
+      const auto count = static_cast<std::size_t>(find_angles(level.fixed, place, angles.data()));
       if (count != expected.size()) {
         ++different;  // rounding decides
         continue;
@@ -122,14 +135,14 @@ TEST_CASE("SIFT's angles are those of the definition") {
 }
 
 TEST_CASE("SIFT's descriptors are those of the definition") {
-  const Level level;
+  const Level level = textured_level();
   on_every_target([&] {
     int off_by_one = 0;
     for (const PlaceInLevel& place : places()) {
       const float angle = place.scale * 3 - 5;
       const auto expected = describe_by_definition(level.view, place, angle);
       std::array<std::uint8_t, kDescriptorSize> bytes;
-      describe(level.view, place, angle, bytes.data());
+      describe(level.fixed, place, angle, bytes.data());
       for (std::size_t i = 0; i < bytes.size(); ++i) {
         REQUIRE(std::abs(bytes[i] - expected[i]) <= 1);
         off_by_one += bytes[i] != expected[i];
@@ -140,14 +153,13 @@ TEST_CASE("SIFT's descriptors are those of the definition") {
 }
 
 TEST_CASE("SIFT finds no angle and describes nothing where nothing changes") {
-  const std::vector<float> samples(40 * 40, 7.F);
-  const LevelView level{samples.data(), 40, 40, 40};
+  const Level level(std::vector<float>(40 * 40, 7.F), 40);
   on_every_target([&] {
     float angles[kMaxOrientations];
-    CHECK(find_angles(level, {20, 20, 2}, angles) == 0);
+    CHECK(find_angles(level.fixed, {20, 20, 2}, angles) == 0);
     std::array<std::uint8_t, kDescriptorSize> bytes;
     bytes.fill(9);
-    describe(level, {20, 20, 2}, 1, bytes.data());
+    describe(level.fixed, {20, 20, 2}, 1, bytes.data());
     CHECK(*std::max_element(bytes.begin(), bytes.end()) == 0);
   });
 }
@@ -157,23 +169,23 @@ TEST_CASE("SIFT's descriptor turns with its angle, its first row of cells is abo
   std::vector<float> samples;
   for (int y = 0; y < 101; ++y) {
     for (int x = 0; x < 101; ++x)
-      samples.push_back(static_cast<float>(x < 50 ? 2 * x : 100 + 2 * y));
+      samples.push_back(static_cast<float>(x < 50 ? 2 * x : 50 + 2 * y));
   }
-  const LevelView level{samples.data(), 101, 101, 101};
+  const Level level(samples, 101);
   on_every_target([&] {
     std::array<std::uint8_t, kDescriptorSize> bytes;
     const auto strongest = [&](int row, int column) {
       const auto first = bytes.begin() + (row * kCells + column) * kDescriptorBins;
       return std::max_element(first, first + kDescriptorBins) - first;
     };
-    describe(level, {50, 50, 2}, 0, bytes.data());
+    describe(level.fixed, {50, 50, 2}, 0, bytes.data());
     for (int row = 0; row < kCells; ++row) {
       CHECK(strongest(row, 0) == 0);
       CHECK(strongest(row, 3) == 2);  // a quarter turn from +x to +y
     }
     // Columns along +y: the columns of cells are now rows of the image, and what was left is in the
     // last row of cells.
-    describe(level, {50, 50, 2}, static_cast<float>(std::numbers::pi / 2), bytes.data());
+    describe(level.fixed, {50, 50, 2}, static_cast<float>(std::numbers::pi / 2), bytes.data());
     for (int column = 0; column < kCells; ++column) {
       CHECK(strongest(3, column) == 6);
       CHECK(strongest(0, column) == 0);
