@@ -19,6 +19,7 @@ if(HYBRID_SLAM_PROGRAMS)
   find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc imgcodecs features2d calib3d dnn videoio)
   find_package(PkgConfig REQUIRED)
   pkg_check_modules(cpp-httplib REQUIRED IMPORTED_TARGET GLOBAL cpp-httplib)
+  pkg_check_modules(jemalloc REQUIRED IMPORTED_TARGET GLOBAL jemalloc)
 endif()
 
 # HYBRID_SLAM_PYTHON: the Python module. AUTO: where there is what it takes; ON: configuring fails without;
