@@ -111,7 +111,7 @@ void judge(const ReferencePatch& patch, const Samples& target, Alignment* result
 
 // From samples with a rim of one pixel.
 Columns columns_of(const Samples& samples, int half, bool horizontal_only) {
-  const int side = 2 * half + 3;
+  const Eigen::Index side = 2 * Eigen::Index{half} + 3;
   Columns columns((side - 2) * (side - 2), kColumns);
   Eigen::Index i = 0;
   for (int v = -half; v <= half; ++v) {

@@ -25,6 +25,11 @@ constexpr float kGreyPerUnit = 1 / ImagePyramid::kUnits;
 constexpr std::size_t kLanes = 8;  // room for the last vector of anything
 constexpr std::size_t kMostInRow = 2 * (kMaxPatchHalfSize + 1) + 1;  // with the derivatives' rim
 
+// Samples in a row of a patch.
+HWY_INLINE std::size_t side_of(int half_size) {
+  return 2 * static_cast<std::size_t>(half_size) + 1;
+}
+
 // Weights of Catmull-Rom interpolation at -1, 0, 1, 2 for t in [0, 1), which sum to `sum`.
 template <class V>
 struct Weights {
@@ -75,7 +80,7 @@ HWY_INLINE void square_by(D d, const Level& level, double cx, double cy, int hal
   const int top = static_cast<int>(y);
   const auto wx = cubic_weights(d, hn::Set(d, static_cast<float>(x - left)));
   const auto wy = cubic_weights(d, hn::Set(d, static_cast<float>(y - top)), kGreyPerUnit);
-  const auto side = static_cast<std::size_t>(2 * half_size + 1);
+  const std::size_t side = side_of(half_size);
   HWY_ALIGN float column[kMostInRow + 3];
   for (std::size_t v = 0; v < side; ++v, samples += side) {
     const std::uint16_t* p0 = level.row(top - 1 + static_cast<int>(v)) + (left - 1);
@@ -97,7 +102,7 @@ HWY_INLINE void square_by(D d, const Level& level, double cx, double cy, int hal
 }
 
 void square(const Level& level, double cx, double cy, int half_size, float* samples) {
-  if (static_cast<std::size_t>(2 * half_size + 1) >= hn::Lanes(Floats())) {
+  if (side_of(half_size) >= hn::Lanes(Floats())) {
     square_by(Floats(), level, cx, cy, half_size, samples);
   } else {
     square_by(hn::CappedTag<float, 1>(), level, cx, cy, half_size, samples);
@@ -149,7 +154,7 @@ struct RowOfPlaces {
 HWY_INLINE void find_places(const Level& level, const Eigen::Vector2d& centre,
                             const Eigen::Vector2d& to_row, const Eigen::Vector2d& step,
                             int half_size, RowOfPlaces* places) {
-  const auto count = static_cast<std::size_t>(2 * half_size + 1);
+  const std::size_t count = side_of(half_size);
   for (std::size_t i = 0; i < count; ++i) {
     const int u = static_cast<int>(i) - half_size;
     const double x = centre.x() + step.x() * u + to_row.x();
@@ -169,7 +174,7 @@ HWY_INLINE void find_places(const Level& level, const Eigen::Vector2d& centre,
 void warped(const Level& level, const Eigen::Vector2d& centre, const Eigen::Matrix2d& warp,
             int half_size, float* HWY_RESTRICT samples) {
   const Floats d;
-  const auto side = static_cast<std::size_t>(2 * half_size + 1);
+  const std::size_t side = side_of(half_size);
   RowOfPlaces places;
   HWY_ALIGN float row[kMostInRow + kLanes];
   for (int v = -half_size; v <= half_size; ++v, samples += side) {
@@ -177,8 +182,8 @@ void warped(const Level& level, const Eigen::Vector2d& centre, const Eigen::Matr
     for (std::size_t i = 0; i < side; i += hn::Lanes(d)) {
       const auto wx = cubic_weights(d, hn::LoadU(d, places.tx.data() + i));
       const auto along = [&](int j) HWY_ATTR {
-        const FourPixels p =
-            read_four(level.pixels.data() + j * level.width, places.corner.data() + i);
+        const FourPixels p = read_four(level.pixels.data() + std::ptrdiff_t{j} * level.width,
+                                       places.corner.data() + i);
         return weighted(wx, p.p0, p.p1, p.p2, p.p3);
       };
       const auto wy = cubic_weights(d, hn::LoadU(d, places.ty.data() + i), kGreyPerUnit);

@@ -17,7 +17,7 @@ constexpr int kBlock = kBlockRows;
 int whole_blocks(int rows) { return (rows + kBlock - 1) / kBlock * kBlock; }
 
 void halve(const float* row, int half_width, float* out) {
-  for (int x = 0; x < half_width; ++x) out[x] = row[2 * x];
+  for (int x = 0; x < half_width; ++x, row += 2) out[x] = *row;
 }
 
 // Ascending by layer, row and column.
@@ -55,7 +55,7 @@ ScaleSpace::Octave ScaleSpace::make_octave(int index) const {
     const bool from_image = k == 0 && index == (upsample_ ? -1 : 0);
     int rows = kBlock;
     if (k + 1 < levels) {
-      const auto above = static_cast<std::size_t>(k + 1);
+      const std::size_t above = static_cast<std::size_t>(k) + 1;
       rows += lags_[above] - lags_[above - 1] + kernels_[above - 1].reach();
     }
     const bool all = k == 0 && !from_image;
