@@ -72,14 +72,12 @@ function(hs_library name)
   endif()
 endfunction()
 
-# hs_program(name SOURCES main.cpp ... DEPENDS ...): a program in bin/. Its memory is jemalloc's, unless a
-# sanitizer brings an allocator of its own.
+# hs_program(name SOURCES main.cpp ... DEPENDS ...): a program in bin/.
 function(hs_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_options(${name} PRIVATE ${HS_BLAS_FIRST})
-  target_link_libraries(${name} PRIVATE hs_options $<$<NOT:$<BOOL:${HYBRID_SLAM_SANITIZE}>>:PkgConfig::jemalloc>
-                                        ${ARG_DEPENDS})
+  target_link_libraries(${name} PRIVATE hs_options ${ARG_DEPENDS})
   hs_use_precompiled(${name} hs_common_headers)
 endfunction()
 
