@@ -80,6 +80,10 @@ class Front {
   Eigen::VectorXd& scale() { return scale_; }
 
  private:
+  template <int kRows>
+  void add_rows_of(std::span<const std::uint32_t> variables, std::span<const Eigen::Index> offsets,
+                   const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual);
+
   static std::vector<Eigen::Index> six_each(std::size_t poses) {
     std::vector<Eigen::Index> offsets;
     for (std::size_t i = 0; i <= poses; ++i) offsets.push_back(static_cast<Eigen::Index>(6 * i));
