@@ -7,8 +7,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "backend/map/prefetch.h"
-
 namespace hybrid_slam {
 
 namespace {
@@ -103,41 +101,6 @@ void IncrementalSolver::assemble(std::uint32_t term, Front& front) const {
   }
 }
 
-// Null if there is none.
-const LandmarkTerm* IncrementalSolver::landmark_at(std::span<const std::uint32_t> terms,
-                                                   std::size_t at) const {
-  if (at >= terms.size()) return nullptr;
-  const Term& term = terms_[terms[at]];
-  return term.kind == TermKind::kLandmark ? landmarks_[term.index].get() : nullptr;
-}
-
-// In steps, since each tells where the next one's memory is.
-void IncrementalSolver::fetch_poses(std::span<const std::uint32_t> terms, std::size_t at) const {
-  if (at + 3 * kPrefetchAhead < terms.size()) prefetch(&terms_[terms[at + 3 * kPrefetchAhead]]);
-  if (const LandmarkTerm* next = landmark_at(terms, at + 2 * kPrefetchAhead)) {
-    prefetch(&next->poses);
-  }
-  if (const LandmarkTerm* next = landmark_at(terms, at + kPrefetchAhead)) {
-    prefetch_all(next->poses);
-  }
-}
-
-void IncrementalSolver::fetch(std::span<const std::uint32_t> terms, std::size_t at) const {
-  if (at + 3 * kPrefetchAhead < terms.size()) prefetch(&terms_[terms[at + 3 * kPrefetchAhead]]);
-  prefetch(landmark_at(terms, at + 2 * kPrefetchAhead));
-  if (const LandmarkTerm* next = landmark_at(terms, at + kPrefetchAhead)) {
-    prefetch_all(next->views);
-  }
-}
-
-// Of the landmark at `at`, if there is one, whose views are in the cache.
-void IncrementalSolver::fetch_measurements(std::span<const std::uint32_t> terms,
-                                           std::size_t at) const {
-  const LandmarkTerm* const landmark = landmark_at(terms, at);
-  if (landmark == nullptr) return;
-  for (const LandmarkView& view : landmark->views) prefetch(&observations_[view.observation]);
-}
-
 void IncrementalSolver::mark_dirty(std::uint32_t term) {
   if (terms_[term].dirty) return;
   terms_[term].dirty = true;
@@ -215,27 +178,30 @@ void IncrementalSolver::fold(std::uint32_t variable) {
 void IncrementalSolver::check(const std::vector<std::uint32_t>& linearized,
                               const std::vector<std::uint32_t>& moved) {
   ++stamp_;
-  std::vector<std::uint32_t> to_check;
-  const auto add = [&](const std::vector<std::uint32_t>& terms) {
+  std::vector<std::uint32_t> due;
+  std::vector<std::uint32_t> other;
+  const auto add = [&](const std::vector<std::uint32_t>& terms, std::vector<std::uint32_t>& to) {
     for (const std::uint32_t id : terms) {
-      if (std::exchange(terms_[id].checked, stamp_) != stamp_) to_check.push_back(id);
+      if (std::exchange(terms_[id].checked, stamp_) != stamp_) to.push_back(id);
     }
   };
-  add(linearized);
-  const std::size_t certain = to_check.size();
+  add(linearized, due);
   for (const std::uint32_t variable : moved) {
-    add(variables_[variable].terms);
-    add(variables_[variable].mixed);
+    add(variables_[variable].terms, other);
+    add(variables_[variable].mixed, other);
   }
-  for (std::size_t i = 0; i < to_check.size(); ++i) {
-    fetch(to_check, i);
-    fetch_measurements(to_check, i + kPrefetchAhead / 2);
-    Term& term = terms_[to_check[i]];
-    if (i >= certain && !has_changed(term)) continue;
-    evaluate(to_check[i]);
+  for (std::size_t i = 0; i < other.size(); ++i) {
+    fetch_change(other, i);
+    if (has_changed(terms_[other[i]])) due.push_back(other[i]);
+  }
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    fetch(due, i);
+    fetch_measurements(due, i);
+    evaluate(due[i]);
+    Term& term = terms_[due[i]];
     if (!term.pending && term.mismatch > 0) {
       term.pending = true;
-      pending_.push_back(to_check[i]);
+      pending_.push_back(due[i]);
     }
   }
   const double negligible = kNegligible * options_.relinearization * typical();

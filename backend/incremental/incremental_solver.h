@@ -229,6 +229,7 @@ class IncrementalSolver final : private TermSource {
                  const Eigen::Vector3d& point, double* residual, double* d_pose = nullptr,
                  double* d_point = nullptr) const;
   int rows_of_observation(std::uint32_t observation) const;
+  void fetch_change(std::span<const std::uint32_t> terms, std::size_t at) const;
   void fetch_measurements(std::span<const std::uint32_t> terms, std::size_t at) const;
   // A term's residual at the present estimate.
   struct Evaluation {

@@ -7,6 +7,7 @@
 
 #include "backend/incremental/front.h"
 #include "backend/incremental/scratch.h"
+#include "backend/map/prefetch.h"
 
 namespace hybrid_slam {
 
@@ -52,6 +53,15 @@ void LandmarkTerm::eliminate() {
       view.reduced.row(i) = factor.triangularView<Eigen::Lower>().solve(cross).transpose();
     }
   }
+}
+
+void FactorView::fetch() const {
+  prefetch_all(variables);
+  prefetch_all(offsets);
+  prefetch_all(rows.jacobian);
+  prefetch_all(rows.residual);
+  prefetch_all(by_point);
+  prefetch_all(reduced);
 }
 
 std::size_t LandmarkTerm::usable_count() const {

@@ -40,6 +40,9 @@ struct FactorView {
   LinearSystem rows;
   Eigen::Matrix<double, Eigen::Dynamic, 3> by_point;
   Eigen::Matrix<double, Eigen::Dynamic, 3> reduced;  // by_variables^T by_point L^-T
+
+  // Asks for what it keeps elsewhere.
+  void fetch() const;
 };
 
 // What tells whether a landmark with factors has to be evaluated (IncrementalSolver::has_changed):

@@ -19,10 +19,10 @@ void prefetch(const T* object) {
   if (object != nullptr) prefetch(object, sizeof(T));
 }
 
-// Elements of a container or span.
+// Elements of a container, span or matrix.
 template <typename Range>
 void prefetch_all(const Range& range) {
-  prefetch(range.data(), range.size() * sizeof(*range.data()));
+  prefetch(range.data(), static_cast<std::size_t>(range.size()) * sizeof(*range.data()));
 }
 
 // How many landmarks ahead: the work on so many takes about as long as memory does to answer.
