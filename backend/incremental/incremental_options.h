@@ -16,12 +16,11 @@ struct IncrementalOptions {
   // (root mean square over all rows).
   double relinearization = 1e-4;
   double worst_mismatch = 0.5;
-  // Back-substitution stops where a pose moves by less, in its standard deviations given what is
-  // eliminated after it, and below, nothing moves. That leaves half the square in the cost, so it
-  // stops later where the cost is small: half of `relinearization` bounds what all leave.
-  double wildfire = 0.3;
-  // The same of other variables; three times as much of one that all terms share, such as a
-  // calibration, which moves a little with every update and so seldom reaches them all.
+  // Back-substitution stops where a pose moves by less (metres, radians).
+  double wildfire = 1e-5;
+  // The same of other variables, in their standard deviations; three times as much of one that all
+  // terms share, such as a calibration, which moves a little with every update and so seldom
+  // reaches them all. What is left out of the cost is half the square of this.
   double block_wildfire = 0.1;
   int max_steps = 3;  // Gauss-Newton steps per update
   // Multiplications that relinearising old terms may cost per update, on average; what was not

@@ -20,7 +20,7 @@ constexpr double kCheap = 0.1;
 
 // Terms near the root come by themselves if all else is off by no more than this part of what is
 // allowed: so the next steps may add as much again, and more, before all has to come.
-constexpr double kLeave = 0.2;
+constexpr double kLeave = 0.25;
 
 // What is shared is told when it has moved so many times as far as other blocks: that leaves out
 // 0.045 of the cost once, and not for each of thousands of blocks.

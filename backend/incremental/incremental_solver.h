@@ -274,7 +274,6 @@ class IncrementalSolver final : private TermSource {
   void take_pending(std::uint32_t id);
   std::size_t settle_moves();
   double typical() const;
-  double worth_telling() const;
 
   // What a step may have to take back.
   struct Moved {

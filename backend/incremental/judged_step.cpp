@@ -22,9 +22,6 @@ constexpr int kAttempts = 8;
 // Mean squared residual below which measurements count as perfect.
 constexpr double kNoResidual = 1e-12;
 
-// What a pose may move by, in standard deviations, however perfect the measurements are.
-constexpr double kLeastTold = 1e-3;
-
 // How often a landmark's displacement is cut in half before it is left where it was.
 constexpr int kCuts = 10;
 
@@ -62,9 +59,7 @@ void IncrementalSolver::step(UpdateSummary& summary) {
     check(std::vector<std::uint32_t>(judged_), {});
     hold_landmarks_back();
   }
-  for (const std::uint32_t variable : tree_.solved()) {
-    if (!variables_[variable].is_block) summary.moved.push_back(variables_[variable].index);
-  }
+  for (const Moved& moved : moved_) summary.moved.push_back(variables_[moved.variable].index);
   for (const MovedBlock& moved : moved_blocks_) {
     summary.moved_blocks.push_back(variables_[moved.variable].index);
   }
@@ -75,14 +70,6 @@ void IncrementalSolver::step(UpdateSummary& summary) {
     if (!displacement(*landmarks_[landmark]).isZero(0)) mark_dirty(landmark_terms_[landmark]);
   }
   held_back_.clear();
-}
-
-// By how many standard deviations a pose moves before those below it are told: half the squares of
-// all poses together stay below a half of what linearisations may leave in the cost.
-double IncrementalSolver::worth_telling() const {
-  const double poses = static_cast<double>(std::max<std::size_t>(1, poses_.size()));
-  const double share = std::sqrt(0.5 * options_.relinearization * squared_norm_ / poses);
-  return std::min(options_.wildfire, std::max(kLeastTold, share));
 }
 
 // Factors, solves, and measures what that does to the terms: these, and those of what moved.
@@ -96,7 +83,7 @@ void IncrementalSolver::solve_step(UpdateSummary& summary,
     summary.undetermined = std::max(summary.undetermined, tree_.last_undetermined());
   }
   std::vector<std::uint32_t> moved;
-  tree_.solve(worth_telling(), moved);
+  tree_.solve(options_.wildfire, moved);
   for (const std::uint32_t variable : moved) {
     if (variables_[variable].is_block) {
       const Block& block = blocks_[variables_[variable].index];

@@ -64,12 +64,9 @@ class PoseTree {
   void refactor(const std::vector<std::uint32_t>& touched, const std::vector<std::uint32_t>& newest,
                 const TermSource& terms);
 
-  // Substitutes back from the root down to where no pose's delta changes by more than `threshold`
-  // any more, in standard deviations given what is eliminated after it. Appends the variables whose
-  // delta changed by more than that, since they were last told, to `changed`.
+  // Substitutes back from the root down to where no delta changes by more than `threshold` any
+  // more. Appends the poses whose delta changed by more than that to `changed`.
   void solve(double threshold, std::vector<std::uint32_t>& changed);
-  // All variables that the last solve gave a delta; none once it is undone.
-  std::span<const std::uint32_t> solved() const { return solved_variables_; }
 
   // Takes the last solve back: all deltas are what they were. The next one looks at them anew.
   void undo_solve();

@@ -7,14 +7,16 @@
 namespace hybrid_slam {
 
 // Whether a variable, solved by a clique's factor from this row on, moved by more than is worth
-// telling: in standard deviations given what is eliminated after it.
+// telling.
 bool PoseTree::has_changed(const Eigen::MatrixXd& factor, std::uint32_t variable, Eigen::Index row,
                            double threshold) const {
   const Eigen::Map<const Eigen::VectorXd> sent(sent_.data() + offset_[variable], size(variable));
+  if (is_pose_[variable] != 0) {
+    return (delta_of(variable) - sent).lpNorm<Eigen::Infinity>() > threshold;
+  }
   const Eigen::VectorXd way = delta_of(variable) - sent;
   const auto root = factor.block(row, row, way.size(), way.size());
   const Eigen::VectorXd in_sigmas = root.triangularView<Eigen::Lower>().transpose() * way;
-  if (is_pose_[variable] != 0) return in_sigmas.norm() > threshold;
   return in_sigmas.norm() > (is_shared(variable) ? options_.shared_share : options_.share);
 }
 
